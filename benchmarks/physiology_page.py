@@ -22,7 +22,8 @@ Coarse hearts (6 x 8 x 2 elements), each beaten through the loop of its species 
 The misfit is the root mean square distance from the targets, in standard deviations as published.
 
 The hearts of the search and those chosen from them are of an earlier mechanics, in which the tension did not depend on
-the velocity of the fibres; *mesh that ships* and *finer mesh* are the default heart.
+the velocity of the fibres; *mesh that ships* and *finer mesh* are the default heart of version 0.2.0 before its walls
+differed and its apex became as thin as it is now.
 """
 
 EFFECTS = {

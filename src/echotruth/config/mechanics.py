@@ -28,7 +28,7 @@ class Active(Section):
     """Velocity, in unloaded lengths per second, at which shortening muscle bears no load. `rat` 12, `human` 8. `null`:
     the tension does not depend on the velocity, as in the paper. Muscle gives most power at about a third of it, and
     hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart shortens by 1.6 per second at most): the
-    default mouse ejects at 4.2 per second, rat at 2.6, human at 1.2."""
+    default mouse ejects at 4.0 per second, rat at 2.5, human at 1.2."""
     hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5
     """Curvature a / F_0 of the force-velocity relation: 0.5 in the model of cardiac muscle of Hunter, McCulloch & ter
     Keurs (Prog Biophys Mol Biol 69 (1998) 289)."""

@@ -26,7 +26,7 @@ class Physiology(Section):
     healthy hearts (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Fraction | None = 0.2
     """Smallest det F at any point in any frame. Lower values mean that elements nearly collapse, whereas myocardium
-    hardly changes its volume; the default heart has 0.87."""
+    hardly changes its volume; the default heart has 0.93."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between prescribed and solved pressure or volume in any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0
@@ -38,10 +38,10 @@ class Physiology(Section):
     1.00 to 1.05. Where it is larger, the tension that meets the loop oscillates from frame to frame, and with it the
     motion."""
     tension_es_min_kPa: FiniteFloat | None = 20.0
-    """Smallest active tension at end-systole; the default mouse has 70, and its largest is 120."""
+    """Smallest active tension at end-systole; the default mouse has 61, and its largest is 95."""
     tension_es_max_kPa: FiniteFloat | None = 180.0
     """Largest active tension at end-systole; the default human has 90, and with five or six frames a beat the mouse
-    140 to 155."""
+    100 to 110."""
     ejection_fraction_min: Fraction | None = 0.4
     """Smallest ejection fraction; healthy mice and rats have 0.42 to 0.89 (Pacher 2008, doi 10.1038/nprot.2008.138,
     table 1). `human` 0.45: 0.58 +- 0.05 and 0.61 +- 0.05 in men and women (Petersen 2017, doi
