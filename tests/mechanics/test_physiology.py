@@ -514,3 +514,13 @@ def test_the_walls_of_a_normal_heart_shorten_as_those_of_people():
     assert np.ptp(even) < 0.003
     assert normal.mean() == pytest.approx(even.mean(), abs=0.003)
     np.testing.assert_allclose(normal / normal.mean(), [1.05, 0.91, 0.91, 1.13], atol=0.03)
+
+
+def test_healthy_heart_of_a_given_stiffness_is_not_held_to_the_volume_of_its_loop():
+    material = {"stiffness_kPa": 2.0}
+    config = Config(geometry=COARSE, loop={"frames": 12}, mechanics={"material": material})
+    found, values = measured_heart(beat(config), config)
+    assert found["edv"] < 0.9 * read_loop(config.loop).edv
+    assert "over the healthy one" not in violation(values, bounds_of(config))
+    soft = configure(config, mechanics={"material": {"stiffness_kPa": None}})
+    assert measured_heart(beat(soft), soft)[1]["edv_of_healthy_min"] == pytest.approx(1, rel=1e-6)

@@ -79,7 +79,9 @@ def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, d
     found = measures(groups["geometry"], mechanics, groups["kinematics"], groups["fibres"]["wall_depth"])
     if config.motion.kind != "beat":
         return found, {}
-    healthy = np.nan if loop.volume is None else loop.edv
+    # With a given stiffness, what the healthy heart holds follows from it, and is not that of the loop.
+    is_held = loop.volume is not None and config.mechanics.material.stiffness_kPa is None
+    healthy = loop.edv if is_held else np.nan
     others = {"active_tension": mechanics["active_tension"], "edv_of_healthy": found["edv"] / healthy}
     return found, bounded(found | others)
 
