@@ -57,6 +57,11 @@ def test_heart_moves_as_in_the_measured_loop(healthy):
     difference = np.abs(healthy["mechanics"]["displacement"] - moved).max()
     assert difference < 0.02 * np.abs(moved).max()
     assert np.isnan(same["mechanics"]["arterial_pressure"]).all()
+    # The cells of a healthy heart bear T_Ca by their contractility, in the loop and, as their lengths are, out of it.
+    for arrays, tolerance in ((same, 1e-6), (healthy, 0.03)):
+        mechanics = arrays["mechanics"]
+        expected = mechanics["active_tension"][:, None] * arrays["pathology"]["tension_scale"]
+        assert np.abs(mechanics["cell_tension"] - expected).max() < tolerance * expected.max()
 
 
 @pytest.mark.slow

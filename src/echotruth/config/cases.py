@@ -103,7 +103,7 @@ HEARTS: dict[str, dict[str, Any]] = {
     "geometry.dilation": {"choice": [1.0, 1.05, 1.1], "weights": [2, 1, 1]},
     "fibres.endo_deg": {"uniform": [60, 85]},
     "fibres.epi_deg": {"uniform": [-60, -35]},
-    "mechanics.active.sheet_share": {"uniform": [0.28, 0.45]},
+    "mechanics.active.sheet_share": {"uniform": [0.3, 0.48]},
     "mechanics.active.normal_share": {"uniform": [0.1, 0.22]},
     "loop.circulation.contractility": {"uniform": [0.6, 1.4]},
     "loop.circulation.resistance": {"uniform": [0.7, 1.4]},

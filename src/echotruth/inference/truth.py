@@ -19,21 +19,20 @@ def truth(repository: Repository, case: str) -> dict[str, float]:
 
 
 def _of_muscle(heart: Heart) -> dict[str, float]:
-    """Contractility and stiffness of segments, relative to the wall, C and the active tension at end-systole."""
+    """Tension at end-systole and stiffness of segments, relative to the wall, and C and that tension of the wall."""
     arrays, mechanics = heart.arrays["pathology"], heart.arrays["mechanics"]
     segments = heart.arrays["fibres"]["segment"].astype(int)
-    tension, volume = means_of_cells(heart.nodes, heart.cells, segments, arrays["tension_scale"])
+    tension, volume = means_of_cells(heart.nodes, heart.cells, segments, mechanics["cell_tension"][heart.es])
     stiffness, _ = means_of_cells(heart.nodes, heart.cells, segments, arrays["stiffness_scale"])
     shown, share = np.flatnonzero(volume), volume / volume.sum()
     tension_mean = float(share[shown] @ tension[shown])
     stiffness_mean = float(np.exp(share[shown] @ np.log(stiffness[shown])))
     found = {f"contractility.{place + 1}": tension[place] / tension_mean for place in shown}
     found |= {f"stiffness.{place + 1}": stiffness[place] / stiffness_mean for place in shown}
-    tension_es = float(mechanics["active_tension"][heart.es])
     kPa = UNITS["kPa"]
     found |= {
         MATERIAL: float(mechanics["stiffness"]) * stiffness_mean / kPa,
-        TENSION: tension_es * tension_mean / kPa,
+        TENSION: tension_mean / kPa,
     }
     return {name: float(value) for name, value in found.items()}
 

@@ -44,11 +44,11 @@ def prescribed_motion(config: Config) -> dict[str, Arrays]:
     displacement = np.stack([displacement_at(config, mesh, mesh.nodes, a) for a in amplitude])
     _check_clearance(config, mesh, displacement)
     phase = np.full(len(amplitude), FILLING, np.uint8)
-    mechanics = unsolved(config, displacement, int(np.argmax(amplitude)), phase)
+    mechanics = unsolved(config, displacement, len(mesh.cells), int(np.argmax(amplitude)), phase)
     return collect_outputs(config, wall(config, mesh), mechanics)
 
 
-def unsolved(config: Config, displacement: Floats, es: int, phase: NDArray[np.uint8]) -> Arrays:
+def unsolved(config: Config, displacement: Floats, n_cells: int, es: int, phase: NDArray[np.uint8]) -> Arrays:
     """The group `mechanics` of a motion that is not solved: what a solution alone has is not a number.
 
     Parameters
@@ -56,6 +56,7 @@ def unsolved(config: Config, displacement: Floats, es: int, phase: NDArray[np.ui
     config : Config
         Only the section loop is used.
     displacement : ndarray of shape (n_frames, n_nodes, 3), m
+    n_cells : int
     es : int
         Frame of end-systole.
     phase : ndarray of shape (n_frames,)
@@ -73,6 +74,7 @@ def unsolved(config: Config, displacement: Floats, es: int, phase: NDArray[np.ui
     return {
         "time": read_loop(config.loop).time,
         **dict.fromkeys(undefined, np.full(frames, np.nan)),
+        "cell_tension": np.full((frames, n_cells), np.nan, np.float32),
         "displacement": displacement,
         "stiffness": np.array(np.nan),
         "es_frame": np.array(es),

@@ -47,7 +47,7 @@ def motion_from_file(config: Config) -> dict[str, Arrays]:
     es = phases.es_frame(no_pressure, volume)
     logger.info("%s", _summary(config, moving, volume, es))
     phase = phases.phases(no_pressure, volume)
-    mechanics = unsolved(config, positions - moving.mesh.nodes, es, phase) | {"volume": volume}
+    mechanics = unsolved(config, positions - moving.mesh.nodes, len(moving.mesh.cells), es, phase) | {"volume": volume}
     arrays = collect_outputs(config, wall(config, moving.mesh), mechanics)
     _check_interpolated(config, arrays["kinematics"]["volume_ratio_min"])
     return arrays

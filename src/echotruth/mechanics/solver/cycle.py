@@ -73,6 +73,8 @@ class SolvedCycle:
         Prescribed by the cycle; not a number where it prescribes none.
     active_tension : ndarray of shape (n_frames,), Pa
         T_Ca of the healthy wall.
+    cell_tension : ndarray of shape (n_frames, n_cells), Pa
+        T of the cells, by their contractility, activation and length.
     newton_steps : ndarray of shape (n_frames,)
         Factorizations.
     residual : ndarray of shape (n_frames,)
@@ -88,6 +90,7 @@ class SolvedCycle:
     pressure_target: Floats
     volume_target: Floats
     active_tension: Floats
+    cell_tension: NDArray[np.float32]
     newton_steps: NDArray[np.int64]
     residual: Floats
     stiffness: float
@@ -237,8 +240,14 @@ def solved_cycle(equations: Equilibrium, cycle: Cycle, frames: Sequence[SolvedFr
         pressure_target=none if cycle.pressure is None else cycle.pressure,
         volume_target=none if cycle.volume is None else cycle.volume,
         active_tension=np.array([frame.state.tension for frame in frames]),
+        cell_tension=np.array([_cell_tension(frame, len(equations.mesh.cells)) for frame in frames], np.float32),
         newton_steps=np.diff([frame.factorizations for frame in frames], prepend=0),
         residual=np.array([frame.max_error for frame in frames]),
         stiffness=frames[0].state.stiffness,
         arterial_pressure=np.array([frame.arterial_pressure for frame in frames]),
     )
+
+
+def _cell_tension(frame: SolvedFrame, n_cells: int) -> Floats:
+    tension = frame.state.tension * frame.load.tension_fraction + frame.load.tension
+    return np.broadcast_to(np.asarray(tension), n_cells)
