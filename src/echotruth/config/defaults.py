@@ -77,7 +77,7 @@ DISEASE_DEFAULTS: dict[str, dict[str, Any]] = {
 }
 """`pathology.preset` -> default of dotted keys; docs/physiology.md says where each is from."""
 DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
-    ("dcm", "rat"): {"loop.circulation.contractility": 0.62},
+    ("dcm", "rat"): {"loop.circulation.contractility": 0.68},
     ("dcm", "human"): {"loop.circulation.contractility": 0.7},
 }
 """`pathology.preset` and `geometry.preset` -> what differs from that."""
