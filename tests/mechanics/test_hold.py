@@ -46,9 +46,7 @@ def test_a_held_heart_does_not_know_how_it_was_turned_tilted_and_shifted_before(
     other = MESH.nodes + displacement
     for frame, vector in enumerate(0.2 * np.random.default_rng(1).normal(size=(3, 3)), 1):
         other[frame] = Rotation.from_rotvec(vector).apply(other[frame]) + 1e-3 * vector
-    np.testing.assert_allclose(
-        held(MESH, other - MESH.nodes, "apex"), held(MESH, displacement, "apex"), atol=1e-12
-    )
+    np.testing.assert_allclose(held(MESH, other - MESH.nodes, "apex"), held(MESH, displacement, "apex"), atol=1e-12)
 
 
 def test_springs_around_a_held_heart_bear_no_torque_so_that_base_and_apex_turn_against_each_other():

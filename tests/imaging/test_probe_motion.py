@@ -1,0 +1,121 @@
+"""Motion of the heart as a whole relative to the probe: a closed form in the image, and no strain."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from echotruth.config import Config
+from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.fem.location import locate
+from echotruth.imaging.truth import material_truth, pixel_truth
+from echotruth.imaging.view import before_probe
+from echotruth.repository.rounding import STRAIN
+from echotruth.tracking.point_grid import grid_positions
+
+FRAMES = 6
+MOTION = {
+    "drift": {"lateral_mm": 0.8, "axial_mm": -0.4, "elevation_mm": 0.2},
+    "breathing": {"axial_mm": 0.5, "rate_per_min": 150.0, "phase_deg": 60.0},
+    "rocking_deg": 6.0,
+}
+POSE = {"tilt_deg": 8.0, "angle_deg": -15.0, "offset": {"lateral_mm": -0.3, "axial_mm": 0.2}}
+AXIS = (np.arange(96) + 0.5) / 96 * 12e-3
+
+
+def config(frames, motion):
+    views = {"mid": POSE | {"motion": motion}, "long": POSE | {"plane": "long_axis", "motion": motion}}
+    return Config.model_validate(
+        {"loop": {"frames": frames, "heart_rate_per_min": 500.0}, "views": views, "tracking": {"grid_px": 8}}
+    )
+
+
+def turn_and_shift(frame):
+    """Rotation on the screen as a complex factor, and displacement: on the screen, and out of the plane, m.
+
+    A beat takes 0.12 s, in which there is 0.3 of a breath.
+    """
+    beats = frame / FRAMES
+    turn = np.exp(1j * np.radians(6) * np.sin(np.pi * beats) ** 2)
+    breath = np.sin(np.pi * 0.3 * beats + np.radians(30)) ** 2 - np.sin(np.radians(30)) ** 2
+    return turn, (0.8 + 0.4j) * 1e-3 * beats - 0.5e-3j * breath, 0.2e-3 * beats
+
+
+@pytest.fixture(scope="module")
+def still(twisting_heart):
+    return replace(twisting_heart, displacement=np.zeros((FRAMES, len(twisting_heart.nodes), 3)))
+
+
+@pytest.mark.parametrize("view", ["mid", "long"])
+def test_tissue_at_rest_moves_in_the_image_as_the_rigid_motion_of_the_closed_form(still, view):
+    setting = config(FRAMES, MOTION)
+    heart, plane = before_probe(still, setting, view)
+    grid = grid_positions(setting)
+    found = material_truth(heart, plane, grid, setting.views[view].plane)
+    inside = found["layer"] > 0
+    at_ed = grid[inside] @ [1, -1j]
+    assert inside.sum() > 100 and not found["true_displacement"][0][inside].any()
+    for frame in range(FRAMES):
+        turn, shift, out = turn_and_shift(frame)
+        # Truth is kept in single precision.
+        displacement = found["true_displacement"][frame][inside] @ [1, -1j]
+        assert np.abs(displacement - (turn * at_ed + shift - at_ed)).max() < 2e-10
+        assert np.abs(found["through_plane"][frame][inside] - out).max() < 1e-10
+        assert np.abs(found["heart_strain"][frame][inside]).max() < 1e-6
+        assert np.abs(found["plane_strain"][frame][inside]).max() < 1e-6
+
+
+def test_pixels_of_a_frame_are_in_the_wall_where_the_motion_undone_leads_into_it(still):
+    heart, plane = before_probe(still, config(FRAMES, MOTION), "mid")
+    truth, frame = pixel_truth(heart, plane, AXIS, AXIS - 6e-3), FRAMES - 1
+    turn, shift, out = turn_and_shift(frame)
+    pixels = (AXIS - 6e-3) - 1j * AXIS[:, None]
+    before = (pixels - shift) / turn
+    at_ed = np.stack([before.real, -before.imag, np.full(before.shape, -out)], axis=-1).reshape(-1, 3)
+    expected = locate(still.positions(0), still.cells, plane.to_heart(at_ed)).cell.reshape(before.shape) >= 0
+    known = np.isfinite(truth["displacement"][frame, ..., 0])
+    assert known.sum() > 500 and np.array_equal(known, expected)
+    displacement = truth["displacement"][frame][known] @ [1, -1j, 0]
+    assert np.abs(displacement - (pixels - before)[known]).max() < 2e-10
+    assert np.abs(truth["strain"][frame][known]).max() < 1e-6
+
+
+STRAIN_SCORES = ("strain_bias", "strain_rms", "frame_strain_rms", "segment_strain_error")
+STRAINS = ("tracked_region_strain", "tracked_segment_strain", "tracked_line_strain")
+
+
+@pytest.mark.parametrize("view", ["mid", "long"])
+def test_strain_and_its_scores_do_not_know_the_motion(twisting_heart, view):
+    """Displacement is stored to 0.06 um, which at points 0.19 mm apart is 3e-4 of strain, and 1e-4 in the mean."""
+    strains, scores = [], []
+    for motion in ({}, MOTION):
+        setting = config(2, motion)
+        (heart, plane), kind = before_probe(twisting_heart, setting, view), setting.views[view].plane
+        truth = ground_truth(heart, plane, kind, setting)
+        exact = material_truth(heart, plane, grid_positions(setting), kind)["true_displacement"][:, truth.inside]
+        strains.append([*truth.strain[:2, 1], truth.operator.strain(exact)[1]])
+        tracked = np.full((2, *truth.inside.shape, 2), np.nan)
+        tracked[:, truth.inside] = truth.displacement
+        scores.append(score(tracked, truth))
+    (alone, moved), (before, after) = strains, scores
+    assert np.nanmax(np.abs(alone[2])) > 0.05
+    np.testing.assert_allclose(moved[:2], alone[:2], atol=1.01 * STRAIN)
+    np.testing.assert_allclose(moved[2], alone[2], atol=2e-6)
+    assert before["nrmse_all"] == after["nrmse_all"] == 0
+    assert np.nanmax(np.abs(after["true_segment_displacement"] - before["true_segment_displacement"])) > 1e-3
+    for name in (*STRAIN_SCORES, *STRAINS):
+        np.testing.assert_allclose(after[name], before[name], atol=1e-4)
+    if view == "mid":  # turned in the image by the whole rocking, at the middle of the beat
+        assert after["tracked_rotation"][1] - before["tracked_rotation"][1] == pytest.approx(np.radians(6), abs=1e-4)
+
+
+def test_no_motion_leaves_the_heart_as_it_is(still):
+    assert before_probe(still, config(FRAMES, {}), "mid")[0] is still
+
+
+def test_breaths_are_as_slow_as_the_size_of_an_animal_makes_them(still):
+    """4.5 beats a breath (Stahl 1967): after a beat from the end of expiration, sin^2(pi / 4.5) of the excursion."""
+    setting = config(2, {"breathing": {"lateral_mm": 1.0}})
+    heart, plane = before_probe(replace(still, displacement=still.displacement[:2]), setting, "mid")
+    moved = plane.to_image(heart.positions(1)) - plane.to_image(heart.positions(0))
+    assert np.allclose(moved, [1e-3 * np.sin(np.pi / 9) ** 2, 0, 0], rtol=1e-9, atol=1e-15)
