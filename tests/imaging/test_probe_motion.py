@@ -2,15 +2,22 @@
 
 from dataclasses import replace
 
+import finished_repository
 import numpy as np
 import pytest
 
-from echotruth.config import Config
-from echotruth.evaluation.scoring import ground_truth, score
+from echotruth.cases import expand
+from echotruth.config import Config, Motion, View
+from echotruth.config.imaging import Excursion, ViewMotion
+from echotruth.config.motion import Rigid
+from echotruth.evaluation.difficulty.floors import difficulty
+from echotruth.evaluation.scoring import ground_truth, read_truth, score
 from echotruth.fem.location import locate
 from echotruth.imaging.truth import material_truth, pixel_truth
 from echotruth.imaging.view import before_probe
-from echotruth.repository.rounding import STRAIN
+from echotruth.learning.point_tracks import PointTracks
+from echotruth.repository.reader import Repository
+from echotruth.repository.rounding import STRAIN, length_quantum
 from echotruth.tracking.point_grid import grid_positions
 
 FRAMES = 6
@@ -119,3 +126,25 @@ def test_breaths_are_as_slow_as_the_size_of_an_animal_makes_them(still):
     heart, plane = before_probe(replace(still, displacement=still.displacement[:2]), setting, "mid")
     moved = plane.to_image(heart.positions(1)) - plane.to_image(heart.positions(0))
     assert np.allclose(moved, [1e-3 * np.sin(np.pi / 9) ** 2, 0, 0], rtol=1e-9, atol=1e-15)
+
+
+def test_run_has_the_motion_in_stored_truth_and_in_what_is_read_of_it(tmp_path):
+    drift = np.array([0.6e-3, -0.3e-3, 0]) * np.arange(finished_repository.FRAMES)[:, None] / finished_repository.FRAMES
+    view = View(angle_deg=10.0, motion=ViewMotion(drift=Excursion(lateral_mm=0.6, axial_mm=-0.3)))
+    rest = Motion(kind="rigid", rigid=Rigid(lateral_um=0.0, axial_um=0.0))
+    setting = finished_repository.configured(seeds=(1,), motion=rest).model_copy(update={"views": {"mid": view}})
+    folder = finished_repository.finish(tmp_path / "small", setting, finished_repository.solved)
+    repository, case = Repository(folder), expand(setting)[0].id
+    clip, tracks = repository.clip(case, "mid"), repository.tracks(case, "mid")
+    truth, points = read_truth(repository, case, "mid"), PointTracks(folder, points=20, start=0)[0]["position_m"]
+    rounding = 0.51 * length_quantum(setting)
+    for frame, moved in enumerate(drift):
+        wall = clip["mask"].values[frame]
+        of_grid = tracks["true_displacement"].values[frame][tracks["layer"].values > 0]
+        for found in (clip["displacement"].values[frame][wall], of_grid):
+            np.testing.assert_allclose(found, np.broadcast_to(moved, found.shape), atol=rounding)
+        np.testing.assert_allclose(truth.displacement[frame] - moved[:2], 0, atol=rounding)
+        np.testing.assert_allclose(points[frame] - points[0] - moved, 0, atol=1e-9)
+    # Tissue stays in the plane, so that its perfect tracker has the drift: what is left is the rounding of the truth.
+    found, largest = difficulty(repository, case, "mid")[0], np.linalg.norm(drift[truth.es])
+    assert found["floor_plane_percent"] < 100 * np.sqrt(2) * rounding / largest

@@ -74,7 +74,7 @@ class _Scene:
     plane: Plane
     truth: Truth
     orders: tuple[list[int], list[int]]
-    is_closed: bool
+    is_closed: bool = True
 
     @classmethod
     def read(cls, repository: Repository, case: str, view: str) -> _Scene:
