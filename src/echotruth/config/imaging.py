@@ -34,10 +34,7 @@ class Excursion(Section):
 
 
 class Breathing(Excursion):
-    """Excursion of the heart from the end of expiration to the end of inspiration, and when it takes place.
-
-    It is half of 1 - cos(2 pi f t + phase) of the excursion, less its value at end-diastole.
-    """
+    """Excursion of the heart from the end of expiration to the end of inspiration, and when it takes place."""
 
     rate_per_min: Positive | None = None
     """Breaths per minute, f. Default: the heart rate over 4.5, as of mammals of any size at rest (Stahl 1967, J Appl
@@ -55,7 +52,8 @@ class ViewMotion(Section):
     drift: Excursion = Excursion()
     """Displacement in the course of one beat, at a constant rate, as of a hand that slips."""
     breathing: Breathing = Breathing()
-    """Excursion of the heart from the end of expiration to the end of inspiration."""
+    """Excursion of the heart from the end of expiration to the end of inspiration, of which it has made the share
+    (1 - cos(2 pi f t + phase)) / 2 a time t after end-diastole, less that at end-diastole."""
     rocking_deg: Annotated[FiniteFloat, Field(ge=-45, le=45)] = 0.0
     """Largest rotation about the middle of the array, counter-clockwise in the image, from end-diastole to the middle
     of the beat and back, as of a probe that the beating chest rocks: a raised cosine."""
