@@ -13,6 +13,8 @@ from echotruth.config.motion import Rigid
 from echotruth.evaluation.difficulty.floors import difficulty
 from echotruth.evaluation.scoring import ground_truth, read_truth, score
 from echotruth.fem.location import locate
+from echotruth.imaging.labels import TissueLabel
+from echotruth.imaging.medium.surroundings import SurroundingsMotion, outside_heart
 from echotruth.imaging.truth import material_truth, pixel_truth
 from echotruth.imaging.view import before_probe
 from echotruth.learning.point_tracks import PointTracks
@@ -114,6 +116,29 @@ def test_strain_and_its_scores_do_not_know_the_motion(twisting_heart, view):
         np.testing.assert_allclose(after[name], before[name], atol=1e-4)
     if view == "mid":  # turned in the image by the whole rocking, at the middle of the beat
         assert after["tracked_rotation"][1] - before["tracked_rotation"][1] == pytest.approx(np.radians(6), abs=1e-4)
+
+
+def test_what_lies_around_moves_with_the_heart_and_less_towards_the_array(still):
+    heart, plane = before_probe(still, config(FRAMES, MOTION), "long")
+    nearest = np.linalg.norm(plane.to_image(still.positions(0)), axis=1).min()
+    deep, near = (nearest * np.array([[0.3, depth, 0.0], [-0.5, depth, 0.0]]) for depth in (1.2, 0.4))
+    place, frame = np.concatenate([deep, near]), 4
+    position, start, (turn, shift, _) = plane.to_heart(place), place @ [1, -1j, 0], turn_and_shift(frame)
+    share = np.minimum(np.abs(start) / nearest, 1)
+    for decay in (0.0, 1e-3):  # the heart does not beat
+        moved = plane.to_image(SurroundingsMotion(heart, position, decay)(frame)) @ [1, -1j, 0]
+        assert np.abs(moved - start - share * (turn * start + shift - start)).max() < 1e-12
+    chest_wall = np.full(len(place), TissueLabel.CHEST_WALL, np.uint8)
+    assert np.array_equal(SurroundingsMotion(heart, position, 0.0, chest_wall)(frame), position)
+
+
+def test_what_is_outside_the_heart_and_the_column_above_its_lid_stays_so_as_the_probe_rocks(still):
+    heart, plane = before_probe(still, config(FRAMES, MOTION), "long")
+    before = plane.to_heart(np.random.default_rng(0).uniform([-4e-3, 1e-3, -2e-3], [4e-3, 12e-3, 2e-3], (4000, 3)))
+    after = before + heart.rigid.displacement(4, before)
+    outside = outside_heart(still, 0, before)
+    assert 0.2 < outside.mean() < 0.95 and np.array_equal(outside_heart(heart, 4, after), outside)
+    assert np.abs(heart.rigid.undone(4, after) - before).max() < 1e-15
 
 
 def test_no_motion_leaves_the_heart_as_it_is(still):

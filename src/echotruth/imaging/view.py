@@ -7,7 +7,7 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Config, Loop, Rf, View
 from echotruth.config.imaging import Breathing, Excursion, ViewMotion
-from echotruth.heart import SHORT_AXIS, Heart
+from echotruth.heart import SHORT_AXIS, Heart, RigidMotion
 from echotruth.loop.cycle import read_loop
 
 BEATS_PER_BREATH = 4.5
@@ -145,12 +145,13 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop) -> Heart:
     cycle, si = read_loop(loop), motion.si()
     time = cycle.time[: len(heart.displacement)]
     angle = si.rocking * raised_cosine(2 * np.pi * time / cycle.period)
-    turn = np.stack([rotation_in_image(each) for each in angle]) - np.eye(3)
     shift = np.outer(time / cycle.period, _vector(motion.drift))
     shift += np.outer(inspiration(motion.breathing, time, cycle.period), _vector(motion.breathing))
-    position = plane.to_image(heart.nodes + heart.displacement)
-    change = position @ turn.swapaxes(1, 2) + shift[:, None]
-    return replace(heart, displacement=heart.displacement + change @ plane.axes)
+    rotation = [plane.axes.T @ rotation_in_image(each) @ plane.axes for each in angle]
+    rigid = RigidMotion(plane.origin, np.stack(rotation), shift @ plane.axes)
+    rigid.rotation[angle == 0] = np.eye(3)  # without rounding
+    change = [rigid.displacement(frame, heart.positions(frame)) for frame in range(len(time))]
+    return replace(heart, displacement=heart.displacement + np.stack(change), rigid=rigid)
 
 
 def inspiration(breathing: Breathing, time: Floats, period: float) -> Floats:
