@@ -10,6 +10,7 @@ import xarray as xr
 
 import echotruth as et
 from echotruth.config import View
+from echotruth.config.imaging import Excursion, Offset, ViewMotion
 from echotruth.config.loading import ConfigError
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.tracks import visible
@@ -219,6 +220,33 @@ def test_other_probe_view_and_size_are_imaged(heart):
     other = et.image(heart, View(plane="long_axis"), probe="mouse_30MHz", size=64)
     assert other["image"].shape == (3, 64, 64)
     assert other.attrs["view"] == "view"
+
+
+MOVING = View(
+    position=0.5,
+    angle_deg=20.0,
+    offset=Offset(lateral_mm=0.4),
+    motion=ViewMotion(drift=Excursion(lateral_mm=0.6, axial_mm=-0.3)),
+)
+
+
+def test_motion_of_the_probe_is_in_image_truth_tracks_and_scores():
+    """A tube at rest drifts by a third of the way in each of three frames, in the images too."""
+    heart = et.beat(TUBE | {"motion": {"kind": "rigid", "rigid": {"lateral_um": 0.0, "axial_um": 0.0}}})
+    clip = et.image(heart, MOVING)
+    drift = np.array([0.6e-3, -0.3e-3, 0]) * np.arange(3)[:, None] / 3
+    wall = clip["mask"].values
+    for frame in range(3):
+        np.testing.assert_allclose(clip["displacement"].values[frame][wall[frame]] - drift[frame], 0, atol=2e-7)
+    tracked = et.track(clip, "dis")
+    found = tracked["displacement"].values[:, clip["grid_mask"].values]
+    np.testing.assert_allclose(np.median(found, axis=1), drift[:, :2], atol=20e-6)  # a fifth of a pixel
+    true = tracked.copy(deep=True)
+    true["displacement"][:] = drift[:, None, None, :2]
+    assert et.evaluate(true, heart)["nrmse_percent"] < 0.1 < et.evaluate(tracked, heart)["nrmse_percent"]
+    point = np.argwhere(wall[0])[:1, ::-1]
+    path = et.point_tracks(heart, clip, point)["position"].values[:, 0]
+    np.testing.assert_allclose(path - path[0], drift[:, :2], atol=1e-12)
 
 
 def test_function_that_raises_is_named(clip):

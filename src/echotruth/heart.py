@@ -15,6 +15,33 @@ SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
 
 
 @dataclass(frozen=True)
+class RigidMotion:
+    """Rigid motion of a heart relative to a probe: x goes to c + R (x - c) + d.
+
+    Attributes
+    ----------
+    centre : ndarray of shape (3,), m
+        c, the middle of the array.
+    rotation : ndarray of shape (frame, 3, 3)
+        R; none in frame 0.
+    shift : ndarray of shape (frame, 3), m
+        d; none in frame 0.
+    """
+
+    centre: Floats
+    rotation: Floats
+    shift: Floats
+
+    def displacement(self, frame: int, positions: Floats) -> Floats:
+        """Displacement in a frame of what would be at positions (n, 3), m, without this motion; (n, 3), m."""
+        return (positions - self.centre) @ (self.rotation[frame] - np.eye(3)).T + self.shift[frame]
+
+    def undone(self, frame: int, positions: Floats) -> Floats:
+        """Where what is at positions (n, 3), m, in a frame would be without this motion; (n, 3), m."""
+        return (positions - self.centre - self.shift[frame]) @ self.rotation[frame] + self.centre
+
+
+@dataclass(frozen=True)
 class Heart:
     """A beating heart: a mesh and its displacement in every frame.
 
@@ -34,6 +61,8 @@ class Heart:
         Frame of end-systole.
     region : ndarray of shape (n_cells,), uint8, optional
         Region of disease of each cell: 0 healthy, 1 infarct, 2 border zone, 3 late activation.
+    rigid : RigidMotion, optional
+        Motion relative to a probe, which the displacement has on top of that of the heart.
     config : Config, optional
         The configuration it was made by.
     arrays : dict of dict of ndarray
@@ -55,6 +84,7 @@ class Heart:
     layers: int
     es: int
     region: NDArray[np.uint8] | None = None
+    rigid: RigidMotion | None = field(default=None, repr=False)
     config: Config | None = field(default=None, repr=False)
     arrays: dict[str, dict[str, NDArray]] = field(default_factory=dict, repr=False)
 
@@ -88,3 +118,7 @@ class Heart:
     def positions(self, frame: int) -> Floats:
         """Nodes in a frame, (n_nodes, 3), m."""
         return self.nodes + self.displacement[frame]
+
+    def without_rigid(self, frame: int, positions: Floats) -> Floats:
+        """Where what is at positions (n, 3), m, in a frame would be without the rigid motion; (n, 3), m."""
+        return positions if self.rigid is None else self.rigid.undone(frame, positions)

@@ -30,6 +30,14 @@ def test_given_frames_stay_as_they_are_and_what_lies_beside_an_unknown_one_is_un
     assert found[7] == 1.5  # half-way from the last given frame to end-diastole
 
 
+@pytest.mark.parametrize("step", [2, 3, 5])
+def test_path_of_an_open_clip_does_not_lead_back_after_the_last_given_frame(step):
+    drift = np.arange(FRAMES)[:, None] * [1.0, -2.0]
+    last = (FRAMES - 1) // step * step
+    found = between_frames(drift[::step], step, FRAMES, is_closed=False)
+    np.testing.assert_allclose(found, np.minimum(np.arange(FRAMES), last)[:, None] * [1.0, -2.0], rtol=0, atol=1e-12)
+
+
 @pytest.fixture
 def clip():
     """Function from a step to a clip of random images with three points."""

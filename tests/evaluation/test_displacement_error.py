@@ -34,6 +34,14 @@ def test_long_axis_is_transverse_and_longitudinal():
     np.testing.assert_allclose(moved, [[0.1, 0.2], [-0.1, 0.2]])
 
 
+def test_components_in_a_long_axis_turn_with_the_probe():
+    turn = np.array([[0.8, 0.6], [-0.6, 0.8]])
+    arm, vector = np.array([[1e-3, 0], [-1e-3, 2e-3]]), np.array([[0.1, 0.2], [0.3, -0.2]])
+    upright = resolve(vector, ORIGIN + arm, ORIGIN, "long_axis")
+    turned = resolve(vector @ turn.T, ORIGIN + arm @ turn.T, ORIGIN, "long_axis", (0.6, 0.8))
+    np.testing.assert_allclose(turned, upright, atol=1e-15)
+
+
 def test_rotation_is_tangential_and_scaling_radial():
     wall, arm = ring()
     turned = 0.1 * np.stack([arm[:, 1], -arm[:, 0]], -1)

@@ -18,6 +18,7 @@ from echotruth.imaging.bmode import (
     largest_clip,
     line_loss,
     log_compress,
+    persist,
     pixel_centres,
     smooth,
     time_gain_compensation,
@@ -221,6 +222,13 @@ def test_persistence_acts_on_compressed_images_and_the_grey_map_comes_last():
     keys = {"persistence": 0.5, "grey_map": "s_curve", "gain_dB": 6.0}
     clip = largest_clip(lines, SECTOR, RANGE, BMODE.model_copy(update=keys))
     assert np.abs(clip - 255 * (3 * shown**2 - 2 * shown**3)).max() < 0.51
+
+
+def test_persistence_of_an_open_clip_begins_with_its_first_image():
+    first, second, third = levels = np.random.default_rng(0).random((3, 2, 2))
+    shown = persist(levels, 0.5, is_closed=False)
+    expected = [first, (first + second) / 2, (first + second) / 4 + third / 2]
+    np.testing.assert_allclose(shown, expected, rtol=1e-15)
 
 
 def test_a_clip_is_smoothed_before_its_edges_are_enhanced():

@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 
 from echotruth.aha import segment
-from echotruth.config import Config, Rf, View
+from echotruth.config import Bmode, Config, Probe, Rf, View
+from echotruth.config.imaging import Offset, ViewMotion
+from echotruth.config.loading import ConfigError, validate
 from echotruth.echo.wall import LEFT_AND_RIGHT, SEPTAL_AND_FREE
+from echotruth.imaging.beamforming.scanner import Scanner
+from echotruth.imaging.bmode import bmode_clip, pixel_centres
 from echotruth.imaging.view import imaging_plane
 
 ENDO = np.array([[0, 0, -6e-3], [1e-3, 0, 0], [-1e-3, 0, -1e-3]])
@@ -83,3 +87,63 @@ def test_views_of_an_echo_show_the_segments_that_they_do_in_life():
         height = np.full_like(around, views[name].position * -6e-3)
         ring = np.column_stack([3e-3 * np.cos(around), 3e-3 * np.sin(around), height])
         assert set(segment(ring, -6e-3)) == {*walls[0], *walls[1]}
+
+
+def on_screen(position):
+    """Lateral and axial coordinates (n, 3) as complex numbers, to the right and up."""
+    return position[:, 0] - 1j * position[:, 1]
+
+
+POSE = {"angle_deg": 12.0, "offset": Offset(lateral_mm=1.5, axial_mm=-0.7)}
+FOCUS = -6.5e-3j
+"""On the screen: the middle of the heart before an upright probe."""
+
+
+def posed(upright):
+    """Where a turned and moved probe shows what an upright one shows, on the screen."""
+    return (upright - FOCUS) * np.exp(1j * np.radians(12)) + FOCUS - (1.5e-3 + 0.7e-3j)
+
+
+@pytest.mark.parametrize(
+    "view", [View(position=0.3, tilt_deg=10.0), View(plane="long_axis", rotation_deg=-60.0, tilt_deg=-15.0)]
+)
+def test_probe_turned_and_moved_in_its_plane_shows_the_heart_turned_counter_clockwise_and_moved_back(view):
+    points = np.random.default_rng(0).normal(size=(10, 3)) * 1e-3
+    upright = imaging_plane(view, Rf(), ENDO).to_image(points)
+    found = imaging_plane(view.model_copy(update=POSE), Rf(), ENDO).to_image(points)
+    assert np.abs(on_screen(found) - posed(on_screen(upright))).max() < 1e-15
+    assert np.abs(found[:, 2] - upright[:, 2]).max() < 1e-15
+
+
+def test_image_of_a_point_appears_where_the_pose_of_the_probe_puts_it():
+    """The lateral wall near the base, at the right of an upright long axis and 2 mm below the middle of the heart."""
+    plane = imaging_plane(View(plane="long_axis", **POSE), Rf(), ENDO)
+    scanner, bmode = Scanner(Probe(), Rf(lines=129), 13e-3), Bmode(size_px=256, downsampling=(1,))
+    lines = scanner.lines(plane.to_image(np.array([[-2e-3, 0, -1e-3]])), np.ones(1))
+    image = bmode_clip(lines[None], scanner.scan, scanner.range, bmode)[256][0].astype(float)
+    axial, lateral = pixel_centres(bmode, 256)
+    row, column = np.unravel_index(image.argmax(), image.shape)
+    expected = posed(FOCUS + (2e-3 - 2e-3j))
+    assert abs(lateral[column] - 1j * axial[row] - expected) < 12e-3 / 256
+
+
+@pytest.mark.parametrize(
+    ("motion", "is_closed"),
+    [
+        ({}, True),
+        ({"rocking_deg": 5.0}, True),
+        ({"drift": {"elevation_mm": 0.1}}, False),
+        ({"breathing": {"axial_mm": 0.1}}, False),
+        ({"breathing": {"phase_deg": 90.0}}, True),
+    ],
+)
+def test_drift_and_breathing_keep_the_cycle_from_closing(motion, is_closed):
+    assert ViewMotion.model_validate(motion).is_closed == is_closed
+
+
+@pytest.mark.parametrize(
+    "view", [{"offset": {"axial_mm": 5.0}}, {"offset": {"axial_mm": 2.0}, "motion": {"drift": {"axial_mm": -3.0}}}]
+)
+def test_probe_that_would_come_into_the_heart_is_refused(view):
+    with pytest.raises(ConfigError, match=r"views\.mid\.offset\.axial_mm .*brings the array into the heart"):
+        validate({"views": {"mid": view}}, "test")

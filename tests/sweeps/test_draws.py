@@ -44,6 +44,17 @@ def test_values_have_their_distribution(key, distribution):
     assert abs(values.mean() - distribution.mean()) < 4 * distribution.std() / math.sqrt(len(values))
 
 
+def test_pose_and_motion_of_a_probe_are_drawn_for_every_case():
+    keys = {
+        "views.mid.angle_deg": {"uniform": [-15, 15]},
+        "views.mid.motion.breathing.phase_deg": {"uniform": [0, 360]},
+    }
+    cases = expand(validate({"cases": {"draw": {"number": 4, "keys": keys}}}, "test"))
+    views = [case.config.views["mid"] for case in cases]
+    assert sorted(np.floor([view.angle_deg / 7.5 for view in views])) == [-2, -1, 0, 1]  # one in each quarter
+    assert len({view.motion.breathing.phase_deg for view in views}) == 4 and len({case.heart for case in cases}) == 1
+
+
 def test_truncated_values_stay_within_their_limits_and_rounding_within_bounds():
     values = drawn(20000)
     assert min(values["loop.edv_uL"]) >= 45 and max(values["loop.edv_uL"]) <= 60

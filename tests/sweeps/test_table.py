@@ -14,6 +14,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load, override, validate
 from echotruth.config.table import MAX_BYTES, MAX_CASES, MAX_COLUMNS
 from echotruth.loop.cycle import SHIPPED
+from echotruth.section import value_of
 from echotruth.seeds import generator
 
 TABLE = """\
@@ -92,6 +93,16 @@ def test_poses_of_views_and_the_frame_rate_of_trackers_differ_between_rows(heart
     columns = table([plain, basal, oblique, slow])
     assert list(columns["views.mid.tilt_deg"]) == [0, 0, 12, 0]
     assert list(columns["tracking.frame_step"]) == [1, 1, 1, 2]
+
+
+def test_angle_offset_and_motion_of_a_probe_differ_between_rows(hearts):
+    values = {"angle_deg": 10, "offset.lateral_mm": 1.5, "motion.drift.axial_mm": -0.2, "motion.rocking_deg": 3}
+    keys = [f"views.mid.{name}" for name in values]
+    plain, moved = hearts(f"case,{','.join(keys)}\nplain,,,,\nmoved,{','.join(map(str, values.values()))}\n")
+    assert plain.config.views["mid"] == Config().views["mid"] and plain.heart == moved.heart
+    assert [value_of(moved.config, key) for key in keys] == list(values.values())
+    columns = table([plain, moved])
+    assert [list(columns[key]) for key in keys] == [[0, value] for value in values.values()]
 
 
 def test_row_at_the_pose_of_the_configuration_has_the_id_of_the_heart_without_one(hearts):

@@ -70,6 +70,20 @@ def test_open_clip_that_stays_alike_is_tracked_both_ways_with_a_word(clip, caplo
     np.testing.assert_allclose(found[-1, :, 0], lateral(FRAMES // 2 - 1) / 9, atol=0.3)
 
 
+@pytest.mark.parametrize("settings", [Dis, BsplineDic])
+def test_displacement_of_a_cycle_that_drifts_is_not_drawn_back_to_its_beginning(clip, settings):
+    """It is near enough to be tracked both ways, of which the backward one begins with the whole drift."""
+    drift = np.array([1.5, -1.0]) / FRAMES
+
+    def motion(position, frame):
+        return position + np.array([lateral(frame) / 2, 0.0]) + drift * frame
+
+    frames = clip(motion, FRAMES, SIZE)
+    assert closure(frames, MASK).is_followed
+    found = tracked(frames, settings())
+    np.testing.assert_allclose(found[-1], [[lateral(FRAMES - 1) / 2, 0] + drift * (FRAMES - 1)] * 3, atol=0.2)
+
+
 @pytest.mark.parametrize("noise", [0, 8])
 def test_clip_of_which_nothing_moves_is_taken_for_a_cycle(clip, noise):
     still = clip(lambda position, frame: position, FRAMES, SIZE)

@@ -22,7 +22,7 @@ NOT_SWEPT = (
 """Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases, or
 defaults of other sections."""
 
-_SWEPT_WITHIN = re.compile(r"views\.\w+\.(position|rotation_deg|tilt_deg)|tracking\.frame_step")
+_SWEPT_WITHIN = re.compile(r"views\.\w+\.(?!plane$)[\w.]+|tracking\.frame_step")
 """Keys that can be swept within those that cannot."""
 
 

@@ -7,9 +7,66 @@ from pydantic import BeforeValidator, Field, FiniteFloat
 
 from echotruth.section import Fraction, Name, Positive, Section, check, invalid
 
+Distance = Annotated[FiniteFloat, Field(ge=-1000, le=1000)]
+
+
+class Offset(Section):
+    """Offset of the probe in its plane, along its own axes.
+
+    Without one, the middle of the heart lies at `rf.focus_mm` below the middle of the array.
+    """
+
+    lateral_mm: Distance = 0.0
+    """Along the array: with a positive one the heart lies farther to the left in the image."""
+    axial_mm: Distance = 0.0
+    """Towards the heart, which then lies higher in the image."""
+
+
+class Excursion(Section):
+    """Displacement of the heart as a whole along the axes of the image at end-diastole."""
+
+    lateral_mm: Distance = 0.0
+    """To the right in the image."""
+    axial_mm: Distance = 0.0
+    """Away from the probe."""
+    elevation_mm: Distance = 0.0
+    """Out of the plane, along the elevation axis."""
+
+
+class Breathing(Excursion):
+    """Excursion of the heart from the end of expiration to the end of inspiration, and when it takes place."""
+
+    rate_per_min: Positive | None = None
+    """Breaths per minute, f. Default: the heart rate over 4.5, as of mammals of any size at rest (Stahl 1967, J Appl
+    Physiol 22:453)."""
+    phase_deg: Annotated[FiniteFloat, Field(ge=0, le=360)] = 0.0
+    """Phase at end-diastole: 0 at the end of expiration, 180 at that of inspiration."""
+
+
+class ViewMotion(Section):
+    """Rigid motion of the heart relative to the probe, which comes on top of the beat: all are added.
+
+    Either may move. The truth is that of the image: displacement has this motion, strain has not.
+    """
+
+    drift: Excursion = Excursion()
+    """Displacement in the course of one beat, at a constant rate, as of a hand that slips."""
+    breathing: Breathing = Breathing()
+    """Excursion of the heart from the end of expiration to the end of inspiration, of which it has made the share
+    (1 - cos(2 pi f t + phase)) / 2 a time t after end-diastole, less that at end-diastole."""
+    rocking_deg: Annotated[FiniteFloat, Field(ge=-45, le=45)] = 0.0
+    """Largest rotation about the middle of the array, counter-clockwise in the image, from end-diastole to the middle
+    of the beat and back, as of a probe that the beating chest rocks: a raised cosine."""
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether the heart is back in its place when the next beat begins."""
+        excursions = (self.drift, self.breathing)
+        return not any((each.lateral_mm, each.axial_mm, each.elevation_mm) != (0, 0, 0) for each in excursions)
+
 
 class View(Section):
-    """An imaging plane."""
+    """An imaging plane, and the probe in it."""
 
     plane: Literal["short_axis", "long_axis"] = "short_axis"
     """`short_axis`: perpendicular to the long axis. `long_axis`: contains it, seen from the apex."""
@@ -22,6 +79,19 @@ class View(Section):
     to the side of the elevation axis. Short axis: about the point of the long axis at `position`; the cut is oblique,
     with the anterior wall nearer to the base. Long axis: about the middle of the base; the plane misses the apex, which
     looks foreshortened, and its apical end lies in front of it (`rotation_deg` 0: on the anterior side)."""
+    angle_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 0.0
+    """Angle of the probe in the plane, about the middle of the heart at `rf.focus_mm`; a positive one turns the probe
+    clockwise, and so the heart in the image counter-clockwise."""
+    offset: Offset = Offset()
+    """Offset of the probe in its plane, along its own axes, after it is turned by `angle_deg`."""
+    motion: ViewMotion = ViewMotion()
+    """Rigid motion of the heart relative to the probe, on top of the beat. Default: none."""
+
+    @property
+    def approach_mm(self) -> float:
+        """Upper bound of how much nearer to the heart the probe comes than with offset 0 at end-diastole, mm."""
+        motion = self.motion
+        return self.offset.axial_mm + max(-motion.drift.axial_mm, 0.0) + abs(motion.breathing.axial_mm)
 
 
 ALL_VIEWS = "all"
@@ -173,7 +243,8 @@ class Bmode(Section):
     far below it are white; below, as much is lost at the dark end."""
     persistence: Annotated[FiniteFloat, Field(ge=0, le=0.95)] = 0.0
     """Weight of the image before in every image shown, the rest being the new one; 0 for none. The clip is taken as one
-    cycle that repeats. Speckle and borders lag behind the tissue by persistence / (1 - persistence) frames."""
+    cycle that repeats, unless drift or breathing keep it from closing. Speckle and borders lag behind the tissue by
+    persistence / (1 - persistence) frames."""
     smoothing: Fraction = 0.0
     """Share of a Gaussian mean of the compressed image in the image shown, the rest being the image itself, as scanners
     smooth to reduce speckle; 0 for none, 1 for the mean alone."""

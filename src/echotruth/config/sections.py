@@ -113,6 +113,16 @@ class Config(Section):
         self.require(self.rf.focus_mm > radius, "rf.focus_mm", remedy)
 
     @check
+    def _check_probes(self) -> None:
+        radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
+        for name, view in self.views.items():
+            most = self.rf.focus_mm - radius
+            remedy = "brings the array into the heart: this, what drift.axial_mm is below 0, and the magnitude of "
+            remedy += f"breathing.axial_mm must be less than {most:g} together, rf.focus_mm less the heart's radius"
+            near = view.approach_mm > 0 and view.approach_mm >= most
+            self.require(not near, f"views.{name}.offset.axial_mm", remedy)
+
+    @check
     def _check_shape(self) -> None:
         kind, is_tube = self.motion.kind, self.geometry.shape == "tube"
         self.require(kind != "tube" or is_tube, "motion.kind", "needs geometry.shape = tube")

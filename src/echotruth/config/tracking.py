@@ -280,7 +280,7 @@ class Tracking(Section):
     frame_step: Annotated[int, Field(ge=1, le=1000)] = 1
     """Trackers are given every n-th frame, as of a scanner with an n-th of the frame rate. Displacement and quality in
     the frames between are interpolated linearly in time; the cycle closes, so that after the last given frame they lead
-    back to those of end-diastole one period later."""
+    back to those of end-diastole one period later, and stay in a view that drifts or breathes."""
     trackers: Annotated[dict[Name, Tracker], Field(min_length=1, max_length=64)] = Field(
         default_factory=default_trackers
     )

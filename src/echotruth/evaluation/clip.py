@@ -36,6 +36,8 @@ class Clip:
         Seed of the tracker's random numbers.
     frame_step : int
         Step between the frames that a tracker is given.
+    is_closed : bool
+        Whether the first frame follows the last one; trackers are not told.
     """
 
     frames: np.ndarray
@@ -46,6 +48,7 @@ class Clip:
     frame_time: np.ndarray
     seed: int
     frame_step: int = 1
+    is_closed: bool = True
 
     @property
     def size(self) -> int:
@@ -80,15 +83,17 @@ class Clip:
         quality : ndarray of shape (frame, grid rows, grid columns)
         """
         gridded = np.full((len(self.frames), *self.inside.shape, 3), np.nan)
-        gridded[:, self.inside, :2] = between_frames(displacement, self.frame_step, len(self.frames)) * self.spacing
-        gridded[:, self.inside, 2] = between_frames(quality, self.frame_step, len(self.frames))
+        of_clip = self.frame_step, len(self.frames), self.is_closed
+        gridded[:, self.inside, :2] = between_frames(displacement, *of_clip) * self.spacing
+        gridded[:, self.inside, 2] = between_frames(quality, *of_clip)
         return gridded[..., :2], gridded[..., 2]
 
 
-def between_frames(values: np.ndarray, step: int, frames: int) -> np.ndarray:
+def between_frames(values: np.ndarray, step: int, frames: int, is_closed: bool = True) -> np.ndarray:
     """Values in all frames of a cycle from those in every n-th, linear in time in between.
 
-    Frames are equally far apart. The cycle closes: after the last given frame comes the first one, a period after it.
+    Frames are equally far apart. If the cycle closes, after the last given frame comes the first one, a period after
+    the first; else there is none, and values stay those of the last given frame.
 
     Parameters
     ----------
@@ -96,6 +101,7 @@ def between_frames(values: np.ndarray, step: int, frames: int) -> np.ndarray:
         In the frames 0, `step`, 2 `step` and so on; NaN where unknown.
     step, frames : int
         Step between the given frames, and number of all frames.
+    is_closed : bool
 
     Returns
     -------
@@ -108,7 +114,8 @@ def between_frames(values: np.ndarray, step: int, frames: int) -> np.ndarray:
     before = frame // step
     interval = np.minimum(step, frames - before * step)  # the last one is shorter where the step does not divide them
     weight = ((frame - before * step) / interval).reshape(-1, *(1,) * (values.ndim - 1))
-    given, following = values[before], values[(before + 1) % len(values)]
+    after = (before + 1) % len(values) if is_closed else np.minimum(before + 1, len(values) - 1)
+    given, following = values[before], values[after]
     return np.where(weight > 0, (1 - weight) * given + weight * following, given)
 
 
@@ -136,6 +143,7 @@ def make_clip(case: Case, view: str, frames: np.ndarray, labels: np.ndarray, ins
         frame_time=read_loop(config.loop).time,
         seed=tracker_seed(case, view),
         frame_step=config.tracking.frame_step,
+        is_closed=config.views[view].motion.is_closed,
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echotruth.evaluation import statistics
-from echotruth.evaluation.polar import resolve
+from echotruth.evaluation.polar import UPRIGHT, resolve
 from echotruth.evaluation.statistics import ratio
 
 SEGMENTS = 17
@@ -32,6 +32,8 @@ class WallPoints:
     plane : {"short_axis", "long_axis"}
     layers : int
         Number of layers.
+    long_axis : tuple of two float
+        Unit vector along the long axis of the heart in the image of a long-axis view: lateral, axial.
     """
 
     position: np.ndarray
@@ -40,6 +42,7 @@ class WallPoints:
     origin: np.ndarray
     plane: str
     layers: int = 6
+    long_axis: tuple[float, ...] = UPRIGHT
 
     @property
     def regions(self) -> np.ndarray:
@@ -96,7 +99,7 @@ def evaluate(tracked: np.ndarray, true: np.ndarray, wall: WallPoints, es: int) -
     tracked, true = np.asarray(tracked, float), np.asarray(true, float)
     known = np.isfinite(tracked - true).all(-1, keepdims=True)
     polar = {
-        name: resolve(np.where(known, vector, np.nan), wall.position, wall.origin, wall.plane)
+        name: resolve(np.where(known, vector, np.nan), wall.position, wall.origin, wall.plane, wall.long_axis)
         for name, vector in (("tracked", tracked), ("true", true))
     }
     in_wall = np.isfinite(true[es]).all(-1) & wall.regions[0]

@@ -19,6 +19,7 @@ from echotruth.evaluation.contours import Contours, contours
 from echotruth.evaluation.courses import motion_courses, peak, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints, evaluate
 from echotruth.evaluation.local_fit import LocalFit
+from echotruth.evaluation.polar import UPRIGHT
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.heart import Heart
 from echotruth.imaging.truth import cavity_centroid, material_truth
@@ -123,8 +124,8 @@ def ground_truth(heart: Heart, plane: Plane, kind: str, config: Config) -> Truth
 
 def read_truth(repository: Repository, case: str, view: str) -> Truth:
     """True motion in one view of a repository."""
-    heart, config = repository.heart(case), repository.case(case).config
-    return ground_truth(heart, repository.plane(case, view), config.views[view].plane, config)
+    config = repository.case(case).config
+    return ground_truth(*repository.before_probe(case, view), config.views[view].plane, config)
 
 
 def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config: Config) -> Truth:
@@ -145,7 +146,9 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config
     motion = material_truth(heart, plane, position, kind)
     inside = motion["layer"] > 0
     layer, segment = (motion[name][inside] for name in ("layer", "segment"))
-    wall = WallPoints(position[inside], layer, segment, cavity_centroid(heart, plane), kind, heart.layers)
+    long_axis = tuple(plane.axes[:2, 2] / np.linalg.norm(plane.axes[:2, 2])) if kind == "long_axis" else UPRIGHT
+    centre = cavity_centroid(heart, plane)
+    wall = WallPoints(position[inside], layer, segment, centre, kind, heart.layers, long_axis)
     radius = RADIUS * config.bmode.si().field_of_view
     operator = StrainOperator(wall.position, _single(motion["wall_axes"][inside]), radius)
     displacement, through_plane = (

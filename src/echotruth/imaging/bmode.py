@@ -150,11 +150,12 @@ def log_compress(images: np.ndarray, dynamic_range_dB: float, gain_dB: float = 0
     return np.maximum(1 + 20 * np.log10(relative) / dynamic_range_dB, 0)
 
 
-def persist(levels: np.ndarray, weight: float) -> np.ndarray:
-    """Images of which each is averaged with those before it, in a cycle that repeats.
+def persist(levels: np.ndarray, weight: float, is_closed: bool = True) -> np.ndarray:
+    """Images of which each is averaged with those before it.
 
     y[k] = (1 - w) x[k] + w y[k - 1], where y[-1] is the last image of the same cycle. If the first image began without
-    a past, it alone would have no lag, and the last one would not lead back to it.
+    a past, it alone would have no lag, and the last one would not lead back to it. In a clip that is no closed cycle,
+    y[-1] is the first image x[0].
 
     Parameters
     ----------
@@ -162,14 +163,18 @@ def persist(levels: np.ndarray, weight: float) -> np.ndarray:
         Grey levels x (frames, axial, lateral).
     weight
         Weight w of the image before, from 0 to below 1.
+    is_closed
+        Whether the clip is a cycle that repeats.
 
     Returns
     -------
     y, same shape and type.
     """
-    shown, before = np.empty_like(levels), np.zeros_like(levels[0])
+    shown, before = np.empty_like(levels), np.zeros_like(levels[0]) if is_closed else levels[0]
     for frame, level in enumerate(levels):
         before = shown[frame] = (1 - weight) * level + weight * before
+    if not is_closed:
+        return shown
     # So far the cycle began in the dark. What the last image would have left over fades through all of them.
     last = before / (1 - weight ** len(levels))
     for frame in range(len(levels)):
@@ -277,23 +282,30 @@ def envelope_images(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bm
     return np.stack([convert(envelope(frame, gain)) for frame in lines])
 
 
-def bmode_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> dict[int, np.ndarray]:
-    """B-mode clips of all image sizes; parameters as of :func:`envelope_images`.
+def bmode_clip(
+    lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0, is_closed: bool = True
+) -> dict[int, np.ndarray]:
+    """B-mode clips of all image sizes; parameters as of :func:`largest_clip`.
 
     Returns
     -------
     Size in pixels to clip, shape (frames, size, size), uint8.
     """
-    largest = largest_clip(lines, scan, range_, bmode, gain)
+    largest = largest_clip(lines, scan, range_, bmode, gain, is_closed)
     return {size: downsample(largest, bmode.size_px // size) for size in bmode.sizes}
 
 
-def largest_clip(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0) -> np.ndarray:
-    """B-mode clip of the largest image size (frames, size, size), uint8; parameters as of :func:`envelope_images`."""
+def largest_clip(
+    lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bmode, gain=1.0, is_closed: bool = True
+) -> np.ndarray:
+    """B-mode clip of the largest image size (frames, size, size), uint8.
+
+    Parameters are those of :func:`envelope_images`, and whether the clip is a cycle that repeats.
+    """
     images = envelope_images(lines, scan, range_, bmode, gain)
     levels = log_compress(images, bmode.dynamic_range_dB, bmode.gain_dB)
     if bmode.persistence:
-        levels = persist(levels, bmode.persistence)
+        levels = persist(levels, bmode.persistence, is_closed)
     if bmode.smoothing or bmode.edge_enhancement:
         inside = ScanConversion(scan, range_, bmode).inside
         levels = np.stack([_filtered(level, inside, bmode) for level in levels])

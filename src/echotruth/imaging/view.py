@@ -1,12 +1,17 @@
 """Views: the pose of the probe and the plane it images."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.config import Rf, View
-from echotruth.heart import SHORT_AXIS
+from echotruth.config import Config, Loop, Rf, View
+from echotruth.config.imaging import Breathing, Excursion, ViewMotion
+from echotruth.heart import SHORT_AXIS, Heart, RigidMotion
+from echotruth.loop.cycle import read_loop
+
+BEATS_PER_BREATH = 4.5
+"""Heart rate 241 M^-0.25 over respiratory rate 53.5 M^-0.26, M the mass of a mammal (Stahl 1967)."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,9 @@ class Plane:
 
 
 def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
-    """Plane of a view, with the heart at the transmit focus at end-diastole, where the beam is narrowest.
+    """Plane of a view at end-diastole.
+
+    Unless the probe has an offset, the heart is at the transmit focus, where the beam is narrowest.
 
     Parameters
     ----------
@@ -56,7 +63,8 @@ def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
         axes = tilted(np.array([[-cos, -sin, 0], [0, 0, 1.0], [-sin, cos, 0]]), si.tilt)
         # Half the length of the cavity from the middle of the base, which is the origin of the heart frame.
         centre = apex / 2 * axes[1] + 0.0  # no -0.0
-    return Plane(centre - rf.si().focus * axes[1], axes)
+    axes = turned(axes, si.angle)
+    return Plane(centre + si.offset.lateral * axes[0] - (rf.si().focus - si.offset.axial) * axes[1], axes)
 
 
 def tilted(axes: Floats, angle: float) -> Floats:
@@ -77,3 +85,101 @@ def tilted(axes: Floats, angle: float) -> Floats:
     lateral, axial, elevation = axes
     cos, sin = np.cos(angle), np.sin(angle)
     return np.stack([lateral, cos * axial - sin * elevation, cos * elevation + sin * axial])
+
+
+def turned(axes: Floats, angle: float) -> Floats:
+    """Axes of a probe that is turned in its plane, clockwise in the image; parameters as of :func:`tilted`."""
+    return axes if angle == 0 else rotation_in_image(angle) @ axes
+
+
+def rotation_in_image(angle: float) -> Floats:
+    """Rotation of lateral, axial and elevation by an angle, rad, counter-clockwise in the image, (3, 3).
+
+    Applied to the axes of a probe, it turns the probe clockwise.
+    """
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+
+
+def before_probe(heart: Heart, config: Config, view: str) -> tuple[Heart, Plane]:
+    """A heart before the probe of a view.
+
+    Parameters
+    ----------
+    heart : Heart
+    config : Config
+        How it is imaged.
+    view : str
+        Name of the view.
+
+    Returns
+    -------
+    Heart
+        As it moves relative to the probe, which stands still.
+    Plane
+    """
+    plane = imaging_plane(config.views[view], config.rf, heart.endo_at_ed)
+    return moved(heart, plane, config.views[view].motion, config.loop), plane
+
+
+def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop) -> Heart:
+    """A heart with the rigid motion relative to the probe on top of its own.
+
+    A position x in the image becomes R(t) x + d(t), where R is a rotation about the middle of the array, and d a
+    displacement along the axes of the image; both are none at end-diastole.
+
+    Parameters
+    ----------
+    heart : Heart
+    plane : Plane
+    motion : ViewMotion
+    loop : Loop
+        Its frames are those of the heart.
+
+    Returns
+    -------
+    Heart
+    """
+    if motion == ViewMotion():
+        return heart
+    cycle, si = read_loop(loop), motion.si()
+    time = cycle.time[: len(heart.displacement)]
+    angle = si.rocking * raised_cosine(2 * np.pi * time / cycle.period)
+    shift = np.outer(time / cycle.period, _vector(motion.drift))
+    shift += np.outer(inspiration(motion.breathing, time, cycle.period), _vector(motion.breathing))
+    rotation = [plane.axes.T @ rotation_in_image(each) @ plane.axes for each in angle]
+    rigid = RigidMotion(plane.origin, np.stack(rotation), shift @ plane.axes)
+    rigid.rotation[angle == 0] = np.eye(3)  # without rounding
+    change = [rigid.displacement(frame, heart.positions(frame)) for frame in range(len(time))]
+    return replace(heart, displacement=heart.displacement + np.stack(change), rigid=rigid)
+
+
+def inspiration(breathing: Breathing, time: Floats, period: float) -> Floats:
+    """Share of the excursion of a breath, less that at end-diastole.
+
+    Parameters
+    ----------
+    breathing : Breathing
+    time : ndarray of shape (frame,), s
+        Since end-diastole.
+    period : float, s
+        Of the beat.
+
+    Returns
+    -------
+    ndarray of shape (frame,)
+    """
+    si = breathing.si()
+    rate = 1 / (BEATS_PER_BREATH * period) if si.rate is None else si.rate
+    return raised_cosine(2 * np.pi * rate * time + si.phase) - raised_cosine(np.array(si.phase))
+
+
+def raised_cosine(phase: Floats) -> Floats:
+    """(1 - cos(phase)) / 2 of phases, rad."""
+    return (1 - np.cos(phase)) / 2
+
+
+def _vector(excursion: Excursion) -> Floats:
+    """Lateral, axial and elevation component, (3,), m."""
+    si = excursion.si()
+    return np.array([si.lateral, si.axial, si.elevation])

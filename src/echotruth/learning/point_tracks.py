@@ -11,7 +11,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.labels import LABELS
 from echotruth.imaging.tracks import follow, visible
-from echotruth.imaging.view import imaging_plane
+from echotruth.imaging.view import before_probe
 from echotruth.learning.items import Item, Items, Place
 from echotruth.repository.choice import Names
 
@@ -93,7 +93,7 @@ class PointTracks(Items):
         """Positions of the tissue in all frames, (frame, point, 3), m, that is at points (n, 2) of the image in one."""
         case, view = place
         heart, config = self._heart_of(case), self.repository.case(case).config
-        plane = imaging_plane(config.views[view], config.rf, heart.endo_at_ed)
+        heart, plane = before_probe(heart, config, view)
         return follow(heart.nodes + heart.displacement, heart.cells, plane, points, start)
 
     def _heart_of(self, case: str) -> Heart:

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from echotruth.heart import Heart
 from echotruth.imaging.tracks import follow, visible
 from echotruth.notebook.arguments import check_clip, check_heart
-from echotruth.repository.datasets import case_of, plane_of
+from echotruth.repository.datasets import case_of, imaged_heart
 
 SEEN = "whether the point is within the field of view, the scan and the slice"
 
@@ -55,13 +55,13 @@ def point_tracks(
     """
     check_heart(heart)
     check_clip(clip)
-    case, plane = case_of(clip), plane_of(clip, heart)
+    case, (moving, plane) = case_of(clip), imaged_heart(clip, heart)
     given, start = _checked(points, frame, len(heart.displacement))
     if thickness is not None and not thickness > 0:
         raise ValueError(f"thickness = {thickness}: give a positive length, in m.")
     first = np.array([clip["lateral"].values[0], clip["axial"].values[0]])
     spacing = case.config.bmode.si().field_of_view / clip.sizes["axial"]
-    followed = follow(heart.nodes + heart.displacement, heart.cells, plane, first + given * spacing, start)
+    followed = follow(moving.nodes + moving.displacement, heart.cells, plane, first + given * spacing, start)
     position = followed[..., :2]
     tracks = xr.Dataset(
         {

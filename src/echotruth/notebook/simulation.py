@@ -24,7 +24,7 @@ from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
-from echotruth.imaging.view import imaging_plane
+from echotruth.imaging.view import before_probe
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat as mechanics_beat
 from echotruth.mechanics.beat import simulate
@@ -32,7 +32,7 @@ from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.notebook.arguments import check_clip, check_heart, check_whole
 from echotruth.repository.choice import image_size
-from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, plane_of
+from echotruth.repository.datasets import as_stored, case_of, clip_dataset, dataset, imaged_heart
 from echotruth.seeds import generator
 from echotruth.tracking.plausibility import doubts
 from echotruth.tracking.point_grid import grid_points
@@ -169,17 +169,18 @@ def image(
         raise ValueError("The heart has no configuration: make it by echotruth.beat, or read one of a Repository.")
     config, name = _imaged_by(heart.config, view, probe)
     size = image_size(config, size)
-    case, plane = Case("heart", {}, config), imaging_plane(config.views[name], config.rf, heart.endo_at_ed)
-    random = partial(generator, case, name)
-    sequence = Sequence(config, heart, plane, random)
+    case, (moving, plane) = Case("heart", {}, config), before_probe(heart, config, name)
+    random, is_closed = partial(generator, case, name), config.views[name].motion.is_closed
+    sequence = Sequence(config, moving, plane, random)
     with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
     gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
     pixels = pixel_centres(config.bmode, size)
-    tissue = TissueImages(config, heart, plane, *pixels)
+    tissue = TissueImages(config, moving, plane, *pixels)
+    images = bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain, is_closed)
     values = {
-        f"bmode/{size}": {"image": bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain)[size]},
-        f"truth/{size}": pixel_truth(heart, plane, *pixels, tissue),
+        f"bmode/{size}": {"image": images[size]},
+        f"truth/{size}": pixel_truth(moving, plane, *pixels, tissue),
     }
     clip = clip_dataset(heart, case, name, plane, as_stored(case, values))
     if keep_lines:
@@ -250,7 +251,8 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
         frames = f"{unknown.sum()} of {len(image)} frames have pixels that are NaN"
         warnings.warn(f"{frames}: no displacement is estimated from these", stacklevel=2)
     arguments = Clip(
-        image, mask[0], inside, points, spacing, clip["time"].values, seed, case.config.tracking.frame_step
+        *(image, mask[0], inside, points, spacing, clip["time"].values, seed, case.config.tracking.frame_step),
+        is_closed=case.config.views[clip.attrs["view"]].motion.is_closed,
     )
     settings = tracker_section(case.config, tracker, options)
     found = track_points(*arguments.tracker_arguments, settings)
@@ -296,14 +298,14 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     check_heart(heart)
     if "displacement" not in tracked or set(tracked["displacement"].dims) != {"frame", "axial", "lateral", "plane"}:
         raise ValueError("tracked: has no displacement (frame, axial, lateral, plane): give what et.track returns.")
-    case, attributes, plane = case_of(tracked), tracked.attrs, plane_of(tracked, heart)
+    case, attributes, (moving, plane) = case_of(tracked), tracked.attrs, imaged_heart(tracked, heart)
     frames = len(heart.displacement)
     if tracked.sizes["frame"] != frames:
         raise ValueError(f"The displacement has {tracked.sizes['frame']} frames, and the heart has {frames}.")
     kind = case.config.views[attributes["view"]].plane
     lateral, axial = np.meshgrid(tracked["lateral"].values, tracked["axial"].values)
     position = np.stack([lateral, axial], axis=-1)
-    truth = truth_at(heart, plane, kind, position, case.config)
+    truth = truth_at(moving, plane, kind, position, case.config)
     displacement = tracked["displacement"].transpose("frame", "axial", "lateral", "plane").values
     return pd.Series(metrics(score(displacement, truth), kind), name=attributes.get("tracker"))
 

@@ -13,7 +13,7 @@ from echotruth.config.building import configure
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import wall_mask
-from echotruth.imaging.view import Plane
+from echotruth.imaging.view import Plane, moved
 from echotruth.loop.cycle import read_loop
 from echotruth.repository import rounding, schema
 from echotruth.repository.derived import derived
@@ -99,11 +99,19 @@ def case_of(clip: xr.Dataset) -> Case:
     return Case(clip.attrs["case"], {}, configure(json.loads(clip.attrs["config"])))
 
 
-def plane_of(clip: xr.Dataset, heart: Heart) -> Plane:
-    """The plane of a clip, or of what was tracked in it; ValueError if it was made of another heart."""
+def imaged_heart(clip: xr.Dataset, heart: Heart) -> tuple[Heart, Plane]:
+    """A heart as it moved before the probe of a clip, or of what was tracked in it, and the plane.
+
+    Raises
+    ------
+    ValueError
+        If the clip was made of another heart.
+    """
     if clip.attrs.get("heart", fingerprint(heart)) != fingerprint(heart):
         raise ValueError("The clip was made of another heart: give the one that was imaged.")
-    return Plane(np.array(clip.attrs["plane_origin"]), np.reshape(clip.attrs["plane_axes"], (3, 3)))
+    plane = Plane(np.array(clip.attrs["plane_origin"]), np.reshape(clip.attrs["plane_axes"], (3, 3)))
+    config = case_of(clip).config
+    return moved(heart, plane, config.views[clip.attrs["view"]].motion, config.loop), plane
 
 
 def fingerprint(heart: Heart) -> str:

@@ -17,7 +17,7 @@ from echotruth.config import Config, shipped
 from echotruth.config.diagnosis import DECISIVE, bounds_of
 from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
-from echotruth.imaging.view import Plane, imaging_plane
+from echotruth.imaging.view import Plane, before_probe
 from echotruth.repository import estimates, group, metadata, schema, status
 from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
 from echotruth.repository.group import NotWritten
@@ -540,10 +540,13 @@ class Repository:
                     return f"{what} of {self._place} is {found.get('status')}: {found.get('reason')}"
         return ""
 
+    def before_probe(self, case: str, view: str) -> tuple[Heart, Plane]:
+        """A heart as it moves relative to the probe of a view, and the imaging plane; both in the heart frame."""
+        return before_probe(self.heart(case), self.case(case).config, view)
+
     def plane(self, case: str, view: str) -> Plane:
-        """The imaging plane of a view in the heart frame."""
-        config = self.case(case).config
-        return imaging_plane(config.views[view], config.rf, self.heart(case).endo_at_ed)
+        """The imaging plane of a view in the heart frame, at end-diastole."""
+        return self.before_probe(case, view)[1]
 
     def path(self, group: str, case: str, view: str | None = None) -> str:
         """Path of a group below the store.

@@ -20,7 +20,7 @@ from echotruth.cases.case import Case
 from echotruth.config import Config, View
 from echotruth.config.diagnosis import bounds_of
 from echotruth.heart import Heart
-from echotruth.imaging.view import Plane, imaging_plane
+from echotruth.imaging.view import Plane, before_probe
 from echotruth.repository import group, metadata, schema
 from echotruth.repository.coordinates import coordinates_of
 from echotruth.repository.places import OF_HEART, groups_of, place, repository_folder
@@ -106,17 +106,20 @@ class Job:
         """Function from what is drawn to its random numbers for this case and view."""
         return partial(generator, self.case, str(self.view_name))
 
-    @cached_property
+    @property
     def heart(self) -> Heart:
-        """Solved heart of this case."""
-        return Heart.of(
-            {name: self.read(name) for name in ("geometry", "fibres", "pathology", "mechanics")}, self.config
-        )
+        """Solved heart of this case, as it moves before the probe of the view."""
+        return self._before_probe[0]
 
-    @cached_property
+    @property
     def plane(self) -> Plane:
         """Imaging plane of the view."""
-        return imaging_plane(self.view, self.config.rf, self.heart.endo_at_ed)
+        return self._before_probe[1]
+
+    @cached_property
+    def _before_probe(self) -> tuple[Heart, Plane]:
+        groups = {name: self.read(name) for name in ("geometry", "fibres", "pathology", "mechanics")}
+        return before_probe(Heart.of(groups, self.config), self.config, str(self.view_name))
 
     def read(self, name: str, *arrays: str) -> dict[str, Any]:
         """Arrays of a group for this case (and view), all if none is named."""

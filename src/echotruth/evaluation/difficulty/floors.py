@@ -64,21 +64,25 @@ def difficulty(repository: Repository, case: str, view: str) -> list[Row]:
 
 @dataclass(frozen=True)
 class _Scene:
-    """What all image sizes of a clip share: heart, plane, truth, and the orders in which given frames are visited."""
+    """What all image sizes of a clip share.
+
+    It has heart, plane, truth, the orders in which given frames are visited, and whether the cycle closes.
+    """
 
     heart: Heart
     config: Config
     plane: Plane
     truth: Truth
     orders: tuple[list[int], list[int]]
+    is_closed: bool = True
 
     @classmethod
     def read(cls, repository: Repository, case: str, view: str) -> _Scene:
-        heart, config, plane = repository.heart(case), repository.case(case).config, repository.plane(case, view)
+        config, (heart, plane) = repository.case(case).config, repository.before_probe(case, view)
         truth = ground_truth(heart, plane, config.views[view].plane, config)
         given = range(0, len(truth.displacement), config.tracking.frame_step)
         forward, backward = ([given[visit] for visit in order] for order in forward_backward(len(given)))
-        return cls(heart, config, plane, truth, (forward, backward))
+        return cls(heart, config, plane, truth, (forward, backward), config.views[view].motion.is_closed)
 
     def follow(self, start: Floats, order: list[int]) -> Floats:
         """Positions (visit, n, 2), m, of a perfect tracker of the plane that starts at points (n, 2)."""
@@ -88,7 +92,7 @@ class _Scene:
     def at_es(self, values: Floats) -> Floats:
         """Values of the given frames (given frame, ...) at end-systole, as those of trackers are interpolated."""
         step = self.config.tracking.frame_step
-        found: Floats = between_frames(values, step, len(self.truth.displacement))[self.truth.es]
+        found: Floats = between_frames(values, step, len(self.truth.displacement), self.is_closed)[self.truth.es]
         return found
 
     @property

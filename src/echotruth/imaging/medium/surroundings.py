@@ -54,13 +54,16 @@ class SurroundingsMotion:
     with the base, less towards their roof, and what lies beside them is drawn along, so that there is no gap. The chest
     wall is at rest.
 
+    What moves rigidly before the probe is the heart with all that lies as deep or deeper. Above it this motion falls in
+    proportion to the range, to 0 at the array; the chest wall has none.
+
     Parameters
     ----------
     heart : Heart
     position : ndarray of shape (n, 3), m
         Scatterers at end-diastole, in the heart frame.
     decay_length : float, m
-        0 for surroundings at rest.
+        0 for surroundings that do not follow the beat.
     tissue : ndarray of shape (n,), uint8, optional
         Default: connective tissue alone.
     """
@@ -69,6 +72,8 @@ class SurroundingsMotion:
         self, heart: Heart, position: Floats, decay_length: float, tissue: NDArray[np.uint8] | None = None
     ) -> None:
         self._heart, self._position, self._at_rest = heart, position, decay_length == 0
+        if heart.rigid is not None:
+            self._rigid_share = self._depth_share(heart.rigid.centre, tissue)
         if self._at_rest:
             return
         from scipy.spatial import cKDTree  # takes 50 ms, and few views have surroundings
@@ -98,13 +103,31 @@ class SurroundingsMotion:
         inward[atrial | at_rest] = 0
         return share[:, None], inward
 
+    def _depth_share(self, array: Floats, tissue: NDArray[np.uint8] | None) -> Floats:
+        """Share (n, 1) of the rigid motion before an array, whose middle is given, (3,), m."""
+        nearest = np.linalg.norm(self._heart.positions(0) - array, axis=1).min()
+        share = np.minimum(np.linalg.norm(self._position - array, axis=1) / nearest, 1.0)
+        if tissue is not None:
+            share[tissue == TissueLabel.CHEST_WALL] = 0
+        return share[:, None]
+
     def __call__(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m."""
-        if self._at_rest:
-            return self._position
-        displacement = (self._heart.displacement[frame] - self._heart.displacement[0])[self._epi]
+        position, rigid = self._position if self._at_rest else self._following(frame), self._heart.rigid
+        return position if rigid is None else position + self._rigid_share * rigid.displacement(frame, position)
+
+    def _following(self, frame: int) -> Floats:
+        """Positions in a frame, (n, 3), m, without a rigid motion."""
+        displacement = self._beat(frame)[self._epi]
         position = self._position + np.einsum("pk,pki->pi", self._weight, displacement[self._nearest])
         return position if self._inward is None else position + self._emptied[frame] * self._inward
+
+    def _beat(self, frame: int) -> Floats:
+        """Displacement of the nodes since end-diastole, (n_nodes, 3), m, without a rigid motion."""
+        heart = self._heart
+        if heart.rigid is None:
+            return heart.displacement[frame] - heart.displacement[0]
+        return heart.rigid.undone(frame, heart.positions(frame)) - heart.positions(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,8 +230,9 @@ def outside_heart(heart: Heart, frame: int, position: Floats, *, column: bool = 
 
     That column is the atrium; `column` says whether it counts as outside, because its blood and its walls scatter.
     """
-    nodes, cavity = heart.positions(frame), Cavity(heart.endo)
-    centre, radius = rim(nodes, heart.endo)
+    # Undone, since the long axis turns with a probe that rocks.
+    nodes, position = (heart.without_rigid(frame, each) for each in (heart.positions(frame), position))
+    centre, radius, cavity = *rim(nodes, heart.endo), Cavity(heart.endo)
     outside = column | (position[:, 2] < centre[2]) | (np.hypot(*(position - centre)[:, :2].T) > radius)
     outside[outside] = locate(nodes, heart.cells, position[outside]).cell < 0
     outside[outside] = locate(cavity.positions(nodes), cavity.cells, position[outside]).cell < 0

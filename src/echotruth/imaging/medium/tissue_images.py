@@ -126,8 +126,9 @@ class TissueImages:
 
     def _above_lid(self, frame: int) -> NDArray[np.bool_]:
         """Pixels above the lid of the cavity, (n_axial, n_lateral), where no tissue is around the heart."""
-        centre, radius = rim(self._heart.positions(frame), self._heart.endo)
-        x, y, z = (self._position - centre).T
+        heart = self._heart
+        centre, radius = rim(heart.without_rigid(frame, heart.positions(frame)), heart.endo)
+        x, y, z = (heart.without_rigid(frame, self._position) - centre).T
         return ((z >= 0) & (np.hypot(x, y) <= radius)).reshape(len(self._axial), -1)
 
     def _set_cavity(self, frame: int, flat: Labels) -> None:

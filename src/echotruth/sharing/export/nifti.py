@@ -46,7 +46,7 @@ def write(clip: Clip, path: Path) -> None:
 
 
 def affine(clip: Clip) -> NDArray[np.float64]:
-    """Matrix from voxel (lateral, axial, 0, 1) to the frame of the heart, mm, (4, 4)."""
+    """Matrix from voxel (lateral, axial, 0, 1) to the frame of the heart at end-diastole, mm, (4, 4)."""
     corner = clip.plane.to_heart(np.array([clip.lateral[0], clip.axial[0], 0.0]))
     matrix = np.eye(4)
     matrix[:3, :3] = MM * clip.spacing * clip.plane.axes.T
