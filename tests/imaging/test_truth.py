@@ -76,7 +76,7 @@ def test_the_wall_in_the_image_has_the_area_of_the_wall_in_the_plane(twisting_he
     fine = (np.arange(512) + 0.5) / 512 * 12e-3
     still = _frame(pixel_truth(twisting_heart, mid, fine, fine - 6e-3), 0)
     height = mid.origin[2] + 1.40e-3  # above the equator
-    radii = [r * np.sqrt(1 - (height / length) ** 2) for r, length in ((1.45e-3, 5.40e-3), (2.5e-3, 5.85e-3))]
+    radii = [r * np.sqrt(1 - (height / length) ** 2) for r, length in ((1.45e-3, 5.40e-3), (2.54e-3, 5.64e-3))]
     expected = np.pi * (radii[1] ** 2 - radii[0] ** 2)
     assert still["mask"].sum() * (12e-3 / 512) ** 2 == pytest.approx(expected, rel=0.01)
 

@@ -1,9 +1,11 @@
 """A solved heart that is moved as a whole keeps its shape, and stays where it is held."""
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
-from echotruth.config import Geometry
+from echotruth.config import Config, Geometry
+from echotruth.mechanics.beat import beat
 from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
 from echotruth.mechanics.hold import held
 from echotruth.mechanics.solver.surroundings import circumferential, surface_matrix
@@ -58,6 +60,17 @@ def test_springs_around_a_held_heart_bear_no_torque_so_that_base_and_apex_turn_a
     assert turn[z < 0.1].mean() > np.radians(2) and turn[(z > 0.8) & (z < 0.9)].mean() < -np.radians(3)
     torques = [abs(torque(motion)) for motion in (kept[-1], twisted(bend=0.0)[-1])]
     assert torques[0] < 5e-3 * torques[1]
+
+
+@pytest.mark.slow
+def test_what_is_held_changes_no_strain_and_no_tension():
+    counts = {"circumferential_elements": 6, "longitudinal_elements": 4, "transmural_elements": 1}
+    base, apex = (
+        beat(Config(geometry=counts, loop={"frames": 6}, mechanics={"hold": one})) for one in ("base", "apex")
+    )
+    np.testing.assert_allclose(apex["kinematics"]["strain"], base["kinematics"]["strain"], atol=1e-6)
+    np.testing.assert_array_equal(apex["mechanics"]["cell_tension"], base["mechanics"]["cell_tension"])
+    assert np.ptp(apex["mechanics"]["displacement"] - base["mechanics"]["displacement"], axis=1).max() > 1e-5
 
 
 def torque(displacement):

@@ -6,7 +6,7 @@ import pytest
 from echotruth.config import Config, Geometry, Loop, Mechanics
 from echotruth.loop.cycle import read_loop
 from echotruth.mechanics.beat import beat, unloaded_wall
-from echotruth.mechanics.geometry import epicardial_apex, left_ventricle
+from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.solver.equilibrium import Load, PreviousState, State
 from echotruth.mechanics.solver.stress_point import VOLUMETRIC
 from echotruth.mechanics.solver.surroundings import axial, circumferential, normal, surface_matrix
@@ -161,18 +161,3 @@ def test_base_on_soft_springs_shears_and_lifts_and_on_stiff_ones_does_neither():
     assert abs(soft) > 5 * abs(stiff)
     assert lifted > 1000 * held
     assert lifted > 1e-5
-
-
-@pytest.mark.slow
-def test_holding_the_apex_shifts_the_heart_along_its_axis_and_changes_nothing_else():
-    loop = Loop(frames=6)
-    base, apex = (beat(Config(geometry=COARSE, loop=loop, mechanics=Mechanics(hold=hold))) for hold in ("base", "apex"))
-    shift = apex["mechanics"]["displacement"] - base["mechanics"]["displacement"]
-    np.testing.assert_allclose(shift, np.broadcast_to(shift[:, :1], shift.shape), atol=1e-18)
-    np.testing.assert_array_equal(shift[..., :2], 0)
-    np.testing.assert_array_equal(shift[0], 0)
-    tip = epicardial_apex(left_ventricle(COARSE))
-    np.testing.assert_allclose(np.ptp(apex["mechanics"]["displacement"][:, tip, 2]), 0, atol=1e-18)
-    assert np.ptp(base["mechanics"]["displacement"][:, tip, 2]) > 1e-4
-    np.testing.assert_allclose(apex["kinematics"]["strain"], base["kinematics"]["strain"], atol=1e-6)
-    np.testing.assert_array_equal(apex["mechanics"]["active_tension"], base["mechanics"]["active_tension"])
