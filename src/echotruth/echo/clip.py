@@ -85,12 +85,13 @@ def read_clip(
         recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
         _check_said(recording, spacing_mm, frame_time_ms, name)
         time = _time(recording, frame_time_ms, name)
-    drawn = part_of(part)
-    first, stop = _cycle(recording, time, cycle or (drawn and drawn.cycle), name)
+    if drawn := part_of(part):
+        cycle, crop = cycle or drawn.cycle, crop or drawn.crop
+    first, stop = _cycle(recording, time, cycle, name)
     height, width = recording.frames.shape[1:]
     if crop == "sector":
         crop = sector.find(recording.frames)
-    crop = crop or (drawn and drawn.crop) or (0, 0, width, height)
+    crop = crop or (0, 0, width, height)
     shown = Part((first, stop), (crop[0], crop[1], crop[2], crop[3]))
     frames = _cropped(recording.frames[first:stop], shown.crop, name)
     frames, spacing = _square(frames, _spacing(recording, spacing_mm, name))
