@@ -20,6 +20,10 @@ def clip(tmp_path):
     ("arguments", "sentence"),
     [
         (["no.dcm"], "no.dcm: is not there, or no file: give the path of a clip"),
+        (
+            ["clip.npy"],
+            "clip.npy: does not say the side of its pixels and the time from frame to frame: give --spacing",
+        ),
         (["clip.npy", "--frame-time-ms", "20"], "clip.npy: does not say the side of its pixels: give --spacing-mm"),
         (
             ["clip.npy", "--spacing-mm", "0.3"],
@@ -29,7 +33,7 @@ def clip(tmp_path):
             ["clip.npy", "--spacing-mm", "-1", "--frame-time-ms", "20"],
             "--spacing-mm = -1: give a side from",
         ),
-        (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: give two or more of the 4 frames of clip.npy"),
+        (["KNOWN", "--cycle", "2", "1"], "cycle = 2, 1: give 3 or more of the 4 frames of clip.npy"),
         (["KNOWN", "--crop", "0", "0", "500", "10"], "crop = 0, 0, 500, 10: clip.npy is 120 x 90 px"),
         (["KNOWN", "--wall", "no.csv"], "no.csv: is not there"),
         (["KNOWN", "--wall", "no.csv", "-o", "no.csv"], "no.csv: is not there: give a wall to be corrected"),
@@ -53,6 +57,18 @@ from echotruth.cli import main
 signal.signal(signal.SIGINT, signal.default_int_handler)
 main()
 """
+
+
+def test_sector_that_is_shown_is_told(tmp_path):
+    film = np.zeros((4, 90, 120), np.uint8)
+    film[:, 20:70, 30:100] = np.random.default_rng(0).integers(0, 256, (4, 50, 70))
+    np.save(tmp_path / "clip.npy", film)
+    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20", "--no-browser"]
+    command = [sys.executable, "-m", "echotruth", "draw", str(tmp_path / "clip.npy"), *options]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        process.stdout.readline()
+        process.terminate()
+        assert process.stderr.read().endswith("clip.npy: shows what moves in it: --crop 29 19 101 71\n")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

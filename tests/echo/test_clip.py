@@ -10,6 +10,7 @@ from PIL import Image
 
 import echotruth as et
 from echotruth.echo.failure import EchoError
+from echotruth.echo.wall_file import part
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, Selection
 
@@ -52,7 +53,7 @@ def test_folder_animation_and_array_hold_the_same(tmp_path):
 
 
 def test_colours_become_their_brightness():
-    colour = np.zeros((2, 4, 5, 3), np.uint8)
+    colour = np.zeros((3, 4, 5, 3), np.uint8)
     colour[..., 1] = 200
     np.testing.assert_array_equal(et.read_clip(colour, **GIVEN)["image"], 117)  # 0.587 * 200
 
@@ -190,16 +191,58 @@ def test_what_is_no_clip_is_told(tmp_path, name, content, sentence):
     ("options", "sentence"),
     [
         ({"spacing_mm": None}, "array: does not say the side of its pixels: give spacing_mm"),
+        (dict.fromkeys(GIVEN), "its pixels and the time from frame to frame: give spacing_mm and frame_time_ms"),
         ({"frame_time_ms": None}, "array: does not say the time from frame to frame: give frame_time_ms"),
         ({"spacing_mm": 60}, "spacing_mm = 60: give a side from 0.001 to 10"),
         ({"frame_time_ms": float("nan")}, "frame_time_ms = nan: give a time from 0.01 to 1000"),
-        ({"cycle": (3, 9)}, "cycle = 3, 9: give two or more of the 6 frames of array"),
+        ({"cycle": (3, 9)}, "cycle = 3, 9: give 3 or more of the 6 frames of array"),
         ({"crop": (0, 0, 60, 10)}, "crop = 0, 0, 60, 10: array is 48 x 32 px"),
     ],
 )
 def test_wrong_option_is_told(options, sentence):
     with pytest.raises(EchoError, match=sentence):
         et.read_clip(FILM, **(GIVEN | options))
+
+
+@pytest.mark.parametrize(("frames", "sentence"), [(1, "has 1 frame: a clip needs 3"), (2, "has 2 frames: a clip")])
+def test_clip_of_one_or_two_frames_is_refused(tmp_path, frames, sentence):
+    Image.fromarray(FILM[0]).save(
+        tmp_path / "a.gif", save_all=True, append_images=[*map(Image.fromarray, FILM[1:frames])]
+    )
+    for source in (FILM[:frames], tmp_path / "a.gif"):
+        with pytest.raises(EchoError, match=sentence):
+            et.read_clip(source, **GIVEN)
+
+
+def scanned(shape=(300, 400), frames=8):
+    """A fan of changing speckle, with writing that stays, a trace that moves below it, and noise of compression."""
+    rng = np.random.default_rng(1)
+    row, column = np.indices(shape)
+    radius, angle = np.hypot(row - 20, column - 210), np.arctan2(column - 210, row - 20)
+    fan = (radius > 15) & (radius < 220) & (abs(angle) < 0.6)
+    film = np.where(fan, rng.integers(0, 200, (frames, *shape)), rng.integers(0, 4, (frames, *shape)))
+    film[:, 30:45, 5:90] = 220
+    film[np.arange(frames), 290, 40 * np.arange(frames)] = 255
+    edges = [np.flatnonzero(fan.any(axis)) for axis in (0, 1)]
+    return film.astype(np.uint8), [edges[0][0], edges[1][0], edges[0][-1] + 1, edges[1][-1] + 1]
+
+
+def test_sector_is_found_among_writing_and_traces():
+    film, edges = scanned()
+    clip = et.read_clip(film, **GIVEN, crop="sector")
+    found = part(clip.attrs["part"])
+    assert np.abs(np.array(found.crop) - edges).max() <= 8
+    left, top, right, bottom = found.crop
+    np.testing.assert_array_equal(clip["image"], film[:, top:bottom, left:right])
+    still = np.repeat(film[:1], 3, axis=0)
+    assert et.read_clip(still, **GIVEN, crop="sector")["image"].shape == still.shape
+
+
+def test_part_of_a_wall_is_the_default_of_cycle_and_crop():
+    clip = et.read_clip(FILM, **GIVEN, part="cycle 2 6, crop 8 4 40 30")
+    np.testing.assert_array_equal(clip["image"], FILM[2:6, 4:30, 8:40])
+    assert clip.attrs["part"] == "cycle 2 6, crop 8 4 40 30"
+    assert et.read_clip(FILM, **GIVEN, part=clip.attrs["part"], cycle=(0, 3)).sizes["frame"] == 3
 
 
 def outlier(level, base=FILM):

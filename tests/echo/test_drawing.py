@@ -12,8 +12,9 @@ import pytest
 from PIL import Image
 
 import echotruth as et
-from echotruth.echo.drawing import MAX_BODY, Drawing, DrawingServer, default_output
+from echotruth.echo.drawing import MAX_BODY, Drawing, DrawingServer
 from echotruth.echo.wall import write_wall
+from echotruth.echo.wall_file import default_output
 
 SHAPE, CENTRE, RADII = (90, 120), np.array([60.0, 45.0]), (20.0, 32.0)
 INSERTIONS = {"anterior_insertion": [33.0, 28.0], "inferior_insertion": [33.0, 62.0]}
@@ -106,7 +107,7 @@ def test_what_is_saved_is_the_wall_that_is_read(server, tmp_path):
     status, said = save(server, ring(**INSERTIONS))
     assert (status, said["saved"]) == (200, str(tmp_path / "mine.wall.csv"))
     assert said["thickness_mm"] == pytest.approx(0.3 * 12, rel=1e-3)
-    head = ["# view: mid", "# part: from frame 0, column 0 and row 0 on", "part,lateral_px,axial_px,clicked"]
+    head = ["# view: mid", "# part: cycle 0 4, crop 0 0 120 90", "part,lateral_px,axial_px,clicked"]
     assert Path(said["saved"]).read_text().splitlines()[:4] == [*head, "endocardium,80.00,45.00,0"]
     wall = et.read_wall(said["saved"])
     assert wall.view == "mid"
@@ -122,6 +123,15 @@ def test_saved_wall_is_there_when_the_page_is_opened_again(server):
     assert said["replaces"] and said["wall"]["view"] == "apical"
     assert said["wall"]["anterior_insertion"] == [INSERTIONS["anterior_insertion"]]
     np.testing.assert_allclose(said["wall"]["endocardium"], circle(RADII[0]), atol=0.005)
+
+
+def test_cycle_that_is_chosen_is_saved_and_there_when_the_page_is_opened_again(server, tmp_path):
+    assert ask(server, "GET", "/clip.json")[1]["cycle"] == [0, 4]
+    assert save(server, ring(cycle=[1, 4]))[0] == 200
+    assert et.read_wall(tmp_path / "mine.wall.csv").part == "cycle 1 4, crop 0 0 120 90"
+    assert ask(server, "GET", "/clip.json")[1]["cycle"] == [1, 4]
+    status, said = save(server, ring(cycle=[2, 4]))
+    assert (status, said["error"]) == (400, "cycle: frames 2 to 4 are none of 3 or more frames of the clip")
 
 
 def test_points_that_were_clicked_are_there_when_the_page_is_opened_again(server):

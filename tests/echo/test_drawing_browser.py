@@ -37,7 +37,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(folder):
-    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20"]
+    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20", "--crop", "0", "0", "320", "240"]
     with served_page("draw", str(folder / "clip.npy"), *options) as address:
         yield address
 
@@ -192,6 +192,22 @@ def test_what_is_wrong_is_said_in_the_page(page, folder):
     page.locator("#save").click()
     assert said(page, "Not saved. the endocardium is not inside the epicardium")
     assert not (folder / "clip.wall.csv").exists()
+
+
+def test_end_diastole_is_chosen_saved_and_drawn_in(page, folder, address):
+    for frame, button in ((1, "#first"), (4, "#next")):
+        page.locator("#frame").fill(str(frame))
+        page.locator(button).click()
+    page.locator("#frame").fill("2")
+    page.locator("#next").click()
+    said(page, "Choose a frame 3 or more after end-diastole, 1.")
+    click(page, CENTRE)  # back to end-diastole
+    page.wait_for_function("() => echotruth.frame === 1", timeout=PATIENCE)
+    draw_ring(page)
+    save(page)
+    assert et.read_wall(folder / "clip.wall.csv").part == "cycle 1 4, crop 0 0 320 240"
+    load(page, address)
+    assert page.evaluate("echotruth.frame") == 1 and "1 / 4" in page.locator("#time").inner_text()
 
 
 def test_clip_plays_and_a_click_goes_back_to_its_first_frame(page):

@@ -11,8 +11,10 @@ from PIL import Image
 
 import echotruth as et
 from echotruth.cli import main
+from echotruth.cli.track import TRACKERS
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import write_wall
+from echotruth.evaluation.tracker_options import BUILTIN
 from echotruth.sharing.export import Export, Selection
 
 MIDDLE = (ENDO + EPI) / 2
@@ -131,6 +133,16 @@ def test_wall_too_thin_and_no_clip_are_told(ring):
         et.speckle_tracking(ring.frames, wall)
 
 
+def test_wall_or_mask_beyond_the_image_is_refused_with_both_sizes(ring):
+    wall, clip = ring.wall(), clip_of(ring)
+    beyond = replace(wall, epicardium=wall.epicardium + [40.0, 0.0], endocardium=wall.endocardium + [40.0, 0.0])
+    with pytest.raises(EchoError, match=r"columns 60 to 180 and rows 20 to 140, and the image 160 x 160 px: give"):
+        et.speckle_tracking(clip, beyond)
+    larger = replace(wall, mask_shape=(160, 200))
+    with pytest.raises(EchoError, match=r"the mask of the wall has 200 x 160 px, and the image 160 x 160 px"):
+        et.speckle_tracking(clip, larger)
+
+
 def run(monkeypatch, capsys, *arguments):
     monkeypatch.setattr("sys.argv", ["echotruth", "track", *map(str, arguments)])
     with pytest.raises(SystemExit) as ended:
@@ -140,10 +152,10 @@ def run(monkeypatch, capsys, *arguments):
 
 def test_wall_drawn_in_another_part_of_the_recording_is_refused(ring, tmp_path):
     clip, wall = clip_of(ring), ring.wall()
-    assert clip.attrs["part"] == "from frame 0, column 0 and row 0 on"
-    write_wall(tmp_path / "wall.csv", replace(wall, part="from frame 3, column 8 and row 0 on"))
+    assert clip.attrs["part"] == "cycle 0 10, crop 0 0 160 160"
+    write_wall(tmp_path / "wall.csv", replace(wall, part="cycle 3 10, crop 8 0 160 160"))
     drawn = et.read_wall(tmp_path / "wall.csv")
-    with pytest.raises(et.EchoError, match=r"drawn in the clip from frame 3, .* this clip is from frame 0, .*: give"):
+    with pytest.raises(et.EchoError, match=r"drawn in a clip of cycle 3 10, .* this clip is cycle 0 10, .*: let both"):
         et.speckle_tracking(clip, drawn, "dis")
 
 
@@ -176,6 +188,7 @@ def test_command_writes_page_curves_and_table_of_a_batch(ring, tmp_path, monkeyp
     assert "three.wall.csv: is not there: draw the wall" in told.err
     table = pd.read_csv(tmp_path / "out/strain.csv")
     assert len(table) == 2 and table["gcs_percent"].iloc[0] == table["gcs_percent"].iloc[1]
+    assert table["doubtful"].tolist() == [False, False]
     curves = pd.read_csv(tmp_path / "out/one.csv")
     np.testing.assert_allclose(curves["time_ms"], 10 * np.arange(FRAMES))
     np.testing.assert_allclose(curves["gcs_middle_percent"], 100 * ring.line(MIDDLE), atol=2)
@@ -187,11 +200,12 @@ def test_command_refuses_what_cannot_be(ring, tmp_path, monkeypatch, capsys):
     clip, wall, scale = tmp_path / "one.npy", tmp_path / "ring.npy", ("--spacing-mm", 1, "--frame-time-ms", 1)
     np.save(wall, ring.wall().mask(ring.frames.shape[1:]))
     for arguments, sentence in (
-        ([clip, "--view", "middle"], "view = 'middle'"),
+        ([clip, "--view", "middle", "--wall", wall, *scale], "view = 'middle'"),
+        ([clip, "--wall", wall], "and its view: give --spacing-mm, --frame-time-ms and --view"),
         ([clip, clip, "--view", "mid"], "one.npy: has the name of"),
         ([clip, "--view", "mid"], "one.wall.csv: is not there: draw the wall"),
-        ([clip, "--view", "mid", "--wall", wall], "one.npy: does not say the time from frame to frame"),
-        ([clip, "--view", "mid", "--wall", wall, *scale, "--tracker", "nothing"], "method = 'nothing'"),
+        ([clip, "--view", "mid", "--wall", wall], "frame to frame: give --spacing-mm and --frame-time-ms\n"),
+        ([clip, "--view", "mid", "--wall", wall, *scale, "--tracker", "diss"], "--tracker diss: did you mean dis?"),
         ([clip, clip.with_name("two.npy"), "--view", "mid", "--wall", wall], "suits one clip"),
     ):
         status, told = run(monkeypatch, capsys, *arguments, "-o", tmp_path / "out")
@@ -210,6 +224,25 @@ def many(ring, tmp_path, monkeypatch):
         Image.fromarray(mask).save(tmp_path / f"{name}.png")
     monkeypatch.chdir(tmp_path)
     return ("--spacing-mm", "0.04", "--frame-time-ms", "10", "--tracker", "dis", "--view", "mid")
+
+
+def test_trackers_of_the_help_are_those_that_are_known():
+    assert set(TRACKERS) == {*BUILTIN, *et.configure().tracking.trackers}
+
+
+def test_clip_is_tracked_from_the_frame_that_was_drawn_in_and_its_strain_marked_as_doubtful(
+    ring, tmp_path, monkeypatch, capsys
+):
+    """The recording begins two frames earlier than the cycle, and ends in its midst."""
+    np.save(tmp_path / "late.npy", np.pad(np.roll(ring.frames, 2, axis=0)[:8], [(0, 0), (3, 0), (5, 0)]))
+    write_wall(tmp_path / "late.wall.csv", replace(ring.wall(), part="cycle 2 8, crop 5 3 165 163"))
+    scale = ("--spacing-mm", "0.04", "--frame-time-ms", "10", "--tracker", "dis", "-o", tmp_path / "out")
+    status, told = run(monkeypatch, capsys, tmp_path / "late.npy", *scale)
+    assert status == 0 and "late.npy: tracks 6 frames by dis (cycle 2 8, crop 5 3 165 163)" in told.err
+    assert "% (doubtful), " in told.out and "is it one whole cycle?" in told.err
+    curves = pd.read_csv(tmp_path / "out/late.csv")
+    np.testing.assert_allclose(curves["gcs_middle_percent"], 100 * ring.line(MIDDLE)[:6], atol=2)
+    assert pd.read_csv(tmp_path / "out/strain.csv")["doubtful"].tolist() == [True]
 
 
 def test_clips_of_one_name_are_refused_and_nothing_is_written_over(many, tmp_path, monkeypatch, capsys):

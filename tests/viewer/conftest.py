@@ -23,8 +23,8 @@ def opened(browser, address):
     """A function that opens the page with a query; a script that fails in it, fails the tests."""
     errors = []
 
-    def open_page(query=""):
-        page = browser.new_page(viewport={"width": 1500, "height": 900})
+    def open_page(query="", width=1500):
+        page = browser.new_page(viewport={"width": width, "height": 900})
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(address + query)
         page.wait_for_function("window.echotruth && echotruth.drawn > 0", timeout=120_000)
@@ -36,7 +36,9 @@ def opened(browser, address):
 
 @pytest.fixture(scope="module")
 def one_page(opened):
-    return opened("?tracker=one")
+    page = opened("?tracker=one&colour=none&frame=0")
+    page.evaluate(AS_AT_FIRST)
+    return page
 
 
 AS_AT_FIRST = """() => {
@@ -45,7 +47,7 @@ AS_AT_FIRST = """() => {
     for (const [name, value] of Object.entries(first)) model(name).value = value;
     model("arrows").active = [];
     model("frame").value = 0;
-    model("frame").value_throttled = 0;
+    for (const value of [1, 0]) model("frame").value_throttled = value;  // also where playing has left it
 }"""
 
 

@@ -95,12 +95,12 @@ def test_view_and_size_change_by_a_click_and_are_in_the_address(page, opened):
     again.close()
 
 
-def test_arrows_appear_and_disappear_by_a_click(page):
+def test_paths_appear_and_disappear_by_a_click(page):
     scrub(page, FRAMES - 1)
     drawn_frame(page, FRAMES - 1)
     for kind in ("true", "tracked"):
         for shown in (True, False):
-            page.get_by_text(f"{kind} motion", exact=True).click()
+            page.get_by_text(f"{kind} paths", exact=True).click()
             wait(page, f"(({MODEL})('{kind}_first').data.x0.length > 0) === {str(shown).lower()}")
             page.wait_for_timeout(500)
             assert (pixels_of(screenshot(page), ARROWS[kind]) > 50) is shown
@@ -132,6 +132,60 @@ def test_pointer_says_the_place_and_the_grey_level(page):
         page.mouse.move(box["x"] + 300 + step, box["y"] + 300)
     wait(page, f"({MODEL})('pointer').text.includes('mm, depth')")
     assert page.evaluate(f"({MODEL})('pointer').text").endswith("grey level 10")
+
+
+def test_page_opens_playing_in_colour_with_paths_and_keeps_the_frame_at_which_it_is_paused(opened):
+    page = opened("?tracker=one")
+    before = page.evaluate("echotruth.drawn")
+    wait(page, f"echotruth.drawn > {before + 2 * FRAMES} && ({MODEL})('true_first').data.x0.length > 0")
+    assert page.evaluate(f"({MODEL})('colour_first').data.index[0].length") == FRAMES * SIZES[0] ** 2
+    page.get_by_text("Pause").click()
+    wait(page, "location.search.endsWith(`frame=${echotruth.frame}`)")
+    page.close()
+
+
+def test_path_is_all_steps_up_to_the_frame(page):
+    page.get_by_text("true paths", exact=True).click()
+    lengths = []
+    for frame in range(FRAMES):
+        drawn_frame(page, frame)
+        wait(page, f"({MODEL})('true_first').data.x0.length > 0")
+        lengths.append(len(column(page, "true_first", "x0")))
+        scrub(page, 1)
+    assert lengths == [lengths[0] * (frame + 1) for frame in range(FRAMES)]
+
+
+def test_unknown_case_is_said_in_a_sentence(opened):
+    page = opened("?case=nobody&frame=0")
+    wait(page, f"({MODEL})('message').visible")
+    assert page.evaluate(f"({MODEL})('message').text").startswith("There is no case &#x27;nobody&#x27; here: ")
+    page.close()
+
+
+GEOMETRY = """() => {
+    const frames = ["figure_first", "figure_second"].map(name => Bokeh.documents[0].get_model_by_name(name))
+        .filter(figure => figure.visible).map(figure => Bokeh.index.find_one(figure));
+    const graph = Bokeh.index.find_one(Bokeh.documents[0].get_model_by_name("graph_strain")).el.getBoundingClientRect();
+    return {
+        right: frames.map(view => view.el.getBoundingClientRect().right),
+        sides: frames.map(view => [view.frame.bbox.width, view.frame.bbox.height]),
+        graph: [graph.left, graph.right], wide: document.documentElement.scrollWidth,
+    };
+}"""
+
+
+@pytest.mark.parametrize("query", ["", "&colour=segment", "&colour=strain&other=truth"])
+@pytest.mark.parametrize(("width", "least"), [(390, 120), (1280, 380), (1920, 440)])
+def test_pictures_are_square_and_fill_the_window_with_the_graphs(opened, width, least, query):
+    page = opened(f"?tracker=one&frame=0{query}", width)
+    page.wait_for_timeout(1500)
+    found = page.evaluate(GEOMETRY)
+    for across, along in found["sides"]:
+        assert abs(across - along) <= 1 and across >= least
+    assert found["wide"] == width and max(found["right"]) <= width
+    assert width - found["graph"][1] < 20
+    assert width == 390 or "other" in query or found["graph"][0] > found["right"][0] - 1
+    page.close()
 
 
 def test_playing_goes_on_until_it_is_paused(page):

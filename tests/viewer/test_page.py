@@ -3,6 +3,7 @@
 import shutil
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import parse_qs
 
@@ -23,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def page(repository):
-    made = Page(repository, first(repository), Document())
+    made = Page(repository, replace(first(repository), colour="none"), "", Document())
     made.show()
     return made
 
@@ -43,13 +44,32 @@ def unfinished(tmp_path_factory):
 
 
 def test_address_leads_back_to_the_choice(repository):
-    choice = Choice("heart", "long", SIZES[1], "two", TRUTH, "strain", "LL", "TT", "green_lagrange", "layer 2", 0)
-    assert asked(repository, parse_qs(choice.address)) == choice
+    choice = Choice("heart", "long", SIZES[1], "two", TRUTH, "strain", "LL", "TT", "green_lagrange", "layer 2")
+    assert asked(repository, parse_qs(choice.address)) == (choice, "")
 
 
-def test_address_of_what_is_not_there_is_left_out(repository):
+def test_address_of_what_is_not_there_is_as_at_first_and_said(repository):
     query = {"case": ["none"], "view": ["../.."], "size": ["7"], "colour": ["<b>"], "frame": ["-1"], "else": ["x"]}
-    assert asked(repository, query) == first(repository)
+    choice, said = asked(repository, query)
+    assert choice == first(repository)
+    assert said.startswith("There is no case 'none', no view '../..', no size '7', no colour '<b>', no frame '-1' here")
+
+
+def test_what_is_not_there_is_said_until_something_is_chosen(repository):
+    page = Page(repository, *asked(repository, {"case": ["<i>"]}), Document())
+    page.show()
+    assert page.message.visible and "no case &#x27;&lt;i&gt;&#x27; here" in page.message.text
+    choose(page, view="long")
+    assert not page.message.visible
+
+
+def test_bar_has_the_names_of_segments_and_ticks_of_a_quantity(page):
+    choose(page, colour="segment")
+    bar = page.panels[0].bar
+    assert "7 mid anterior" in bar.major_label_overrides.values()
+    assert list(bar.ticker.ticks) == list(bar.major_label_overrides)
+    choose(page, colour="strain")
+    assert not bar.major_label_overrides and 0 in bar.ticker.ticks
 
 
 def test_page_shows_the_images_of_what_is_chosen(page):
@@ -82,7 +102,7 @@ def test_part_of_the_wall_follows_the_curve(page):
 
 def test_unfinished_case_is_said_so(unfinished):
     repository = Repository(unfinished)
-    page = Page(repository, first(repository), Document())
+    page = Page(repository, first(repository), "", Document())
     for colour in ("none", "strain", "tracked_strain", "segment"):
         choose(page, colour=colour, other=TRUTH)
         assert "Not made for this case" in page.message.text and "images" in page.message.text
@@ -98,7 +118,7 @@ def test_damaged_file_is_said_and_nothing_else_is_shown(shown, tmp_path):
     content[len(content) // 3] ^= 0xFF
     shard.write_bytes(content)
     repository = Repository(folder)
-    page = Page(repository, first(repository), Document())
+    page = Page(repository, first(repository), "", Document())
     page.show()
     assert "cannot be shown" in page.message.text and f"echotruth check {folder}" in page.message.text
     assert not page.clip.data["grey"][0].any()
@@ -120,13 +140,13 @@ def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_m
     run.check_writable()
     run.write(list(run.rows(case_views, sizes)))
     repository = Repository(folder)
-    page = Page(repository, first(repository), Document())
+    page = Page(repository, first(repository), "", Document())
     page.arrows.active = [1]
     choose(page, tracker="outside", colour="displacement_error")
     assert not page.message.visible and page.graphs["strain"].source.data["y1"].shape == (3,)
     assert page.panels[0].colour.data["index"][0].any()
-    moved = page.panels[0].movements["tracked"].data
-    np.testing.assert_allclose(np.nanmax(moved["x1"] - moved["x0"]), 1e3 * 2 * 12e-3 / SIZES[0], rtol=1e-3)
+    start, end = (page.panels[0].movements["tracked"].data[name].reshape(3, -1) for name in ("x0", "x1"))
+    np.testing.assert_allclose(np.nanmax(end[-1] - start[0]), 1e3 * 2 * 12e-3 / SIZES[0], rtol=1e-3)
     choose(page, view="long")
     assert "was not evaluated" in page.message.text and "not evaluated on this clip" in page.facts.text
     assert not page.panels[0].colour.data["index"][0].any() and not page.panels[0].movements["tracked"].data["x0"].size
@@ -137,7 +157,7 @@ def test_ten_thousand_cases_open_in_seconds(tmp_path):
     begin(tmp_path / "small", configured(seeds=range(1, 10_001)))
     start = time.process_time()
     repository = Repository(tmp_path / "small")
-    page = Page(repository, first(repository), Document())
+    page = Page(repository, first(repository), "", Document())
     page.show()
     page.inputs["case"].value = repository.present[7777]
     page.show()
@@ -157,7 +177,7 @@ def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_show
 
 def test_address_that_is_no_text_shows_the_page_as_at_first(repository):
     """%ff is not UTF-8, and no name of a case."""
-    assert asked(repository, texts({"case": [b"\xff"]})) == first(repository)
+    assert asked(repository, texts({"case": [b"\xff"]}))[0] == first(repository)
     assert texts({"view": [b"mid"], "size": []}) == {"view": ["mid"], "size": []}
 
 

@@ -113,12 +113,12 @@ def test_scales_end_at_round_numbers(value, above):
     assert nice(value) == pytest.approx(above)
 
 
-def test_arrows_lead_from_where_points_were_to_where_they_are(points):
+def test_paths_lead_from_where_points_were_to_where_they_are(points):
     for found, moved in ((arrows.true_motion(points), SHIFT[:2]), (arrows.tracked_motion(points, "two"), 2e-4)):
-        np.testing.assert_allclose(
-            found.end[-1] - found.start[-1], np.broadcast_to(1e3 * moved, found.end[-1].shape), atol=1e-3
-        )
-        assert {tuple(place) for place in found.start[0].round(4).tolist()} <= {
+        steps = np.sum(found.end - found.start, axis=0)
+        np.testing.assert_allclose(steps, np.broadcast_to(1e3 * moved, steps.shape), atol=1e-3)
+        np.testing.assert_array_equal(found.start[1:], found.end[:-1])
+        assert {tuple(place) for place in (found.end[-1] - steps).round(4).tolist()} <= {
             tuple(place) for place in (1e3 * points.position).astype(np.float32).round(4).tolist()
         }
 

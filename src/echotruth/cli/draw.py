@@ -1,15 +1,18 @@
 """`echotruth draw`: the wall of a ventricle, drawn in a clip in the browser."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from echotruth.cli import recording
 from echotruth.cli.command import fail
+from echotruth.echo.failure import EchoError
+from echotruth.echo.wall_file import default_output, part, said
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth draw`."""
-    recording.add(parser)
+    recording.add(parser, "what moves in it")
     text = "the wall that is written (default: that of the clip with the ending .wall.csv)"
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help=text)
     text = "table or mask of a wall to be corrected (default: the output, if it is there)"
@@ -21,9 +24,9 @@ def add(parser: argparse.ArgumentParser) -> None:
 def draw(arguments: argparse.Namespace) -> int:
     """Draw the wall of a ventricle in one's own echo.
 
-    A page in the browser shows the clip. Points of the endocardium and the epicardium are clicked in its first frame,
-    at end-diastole, and saved as a table that `echotruth.read_wall` reads (docs/drawing.md). Only this machine can
-    open the page; Ctrl-C ends it.
+    A page in the browser shows the clip. The frame at end-diastole is chosen, points of the endocardium and the
+    epicardium are clicked in it, and both are saved as a table that `echotruth.read_wall` reads (docs/drawing.md). Only
+    this machine can open the page; Ctrl-C ends it.
 
     examples:
       echotruth draw patient.dcm
@@ -34,19 +37,29 @@ def draw(arguments: argparse.Namespace) -> int:
       0  the page was closed
       2  the clip or the wall cannot be shown
     """
+    if not 0 <= arguments.port <= 65535:
+        return fail(f"--port {arguments.port}: give a number from 1 to 65535, or none for any that is free")
+    if names := recording.missing(arguments.clip, arguments):
+        return fail(recording.asked(arguments.clip, names))
     import webbrowser
 
     from echotruth.echo import drawing
-    from echotruth.echo.failure import EchoError
 
-    if not 0 <= arguments.port <= 65535:
-        return fail(f"--port {arguments.port}: give a number from 1 to 65535, or none for any that is free")
+    output = arguments.output or default_output(arguments.clip)
+    begin = arguments.wall or output
+    drawn = part(said(begin, "part") or "")
+    finds_sector = not (arguments.crop or begin.is_file())
+    if arguments.crop is None:
+        arguments.crop = drawn.crop if drawn else "sector" if finds_sector else None
     try:
         clip = recording.read(arguments.clip, arguments)
-        output = arguments.output or drawing.default_output(arguments.clip)
         server = drawing.DrawingServer(drawing.Drawing(clip, output, arguments.wall), arguments.port)
     except EchoError as error:
         return fail(str(error))
+
+    if finds_sector and (shown := part(clip.attrs["part"])):
+        crop = " ".join(map(str, shown.crop))
+        print(f"{arguments.clip}: shows what moves in it: --crop {crop}", file=sys.stderr)
 
     def ready() -> None:
         print(f"{arguments.clip}: {server.address} (Ctrl-C ends it)", flush=True)

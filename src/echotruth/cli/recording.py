@@ -5,26 +5,46 @@ import re
 from pathlib import Path
 from typing import Any
 
-OPTIONS = {"spacing_mm": "--spacing-mm", "frame_time_ms": "--frame-time-ms"}
-"""Names in messages of the library, and those of the command line."""
+from echotruth.echo.failure import FACTS, EchoError, unsaid
+
+TELLING = (".dcm", ".dicom", ".nii", ".nii.gz")
+"""Endings of files that may say the side of pixels and the time from frame to frame; so may a file without one."""
 
 
-def add(parser: argparse.ArgumentParser, several: bool = False) -> None:
-    """Add the clip, or several, and what their files may not say."""
+def add(parser: argparse.ArgumentParser, crop: str, several: bool = False) -> None:
+    """Add the clip, or several, and what their files may not say; `crop` is what is shown by default, in words."""
     text = "DICOM, video, .gif, NIfTI or .npy of one's own echo, or a folder of images"
     parser.add_argument("clip", type=Path, nargs="+" if several else None, help=text)
     parser.add_argument("--spacing-mm", type=float, help="side of a pixel, mm (default: what the file says)")
     parser.add_argument(
         "--frame-time-ms", type=float, help="time from frame to frame, ms (default: what the file says)"
     )
-    text = "first frame, at end-diastole, and the frame after the last (default: from R wave to R wave, else all)"
+    text = "first frame, at end-diastole, and the frame after the last (default: the wall's; else R wave to R wave)"
     parser.add_argument("--cycle", type=int, nargs=2, metavar=("FIRST", "STOP"), help=text)
     sides = ("LEFT", "TOP", "RIGHT", "BOTTOM")
-    parser.add_argument("--crop", type=int, nargs=4, metavar=sides, help="part of the image, px (default: all)")
+    text = f"part of the image, px (default: that of the wall; else {crop})"
+    parser.add_argument("--crop", type=int, nargs=4, metavar=sides, help=text)
 
 
-def read(clip: Path, arguments: argparse.Namespace) -> Any:
-    """Read a clip, with the options of the arguments.
+def missing(clip: Path, arguments: argparse.Namespace) -> list[str]:
+    """Options without which a clip cannot be read, since a file of its kind never says them."""
+    is_silent = clip.is_dir() or (clip.is_file() and clip.suffix and not clip.name.lower().endswith(TELLING))
+    return [name for name in ("spacing_mm", "frame_time_ms") if is_silent and getattr(arguments, name) is None]
+
+
+def asked(clip: Path, names: list[str]) -> str:
+    """Sentence that asks for options which the file of a clip does not say."""
+    return _as_options(unsaid(clip, names))
+
+
+def _as_options(said: str) -> str:
+    """A sentence of the library, with the names that its arguments have on the command line."""
+    names = "|".join(FACTS)
+    return re.sub(rf"\b({names})\b(?=$|,| =| and )", lambda name: f"--{name[0].replace('_', '-')}", said)
+
+
+def read(clip: Path, arguments: argparse.Namespace, part: str = "") -> Any:
+    """Read a clip, with the options of the arguments, and the part of it where these do not say it.
 
     Raises
     ------
@@ -32,7 +52,6 @@ def read(clip: Path, arguments: argparse.Namespace) -> Any:
         If it is no clip, or an option is missing or wrong.
     """
     from echotruth.echo.clip import read_clip
-    from echotruth.echo.failure import EchoError
 
     try:
         return read_clip(
@@ -41,7 +60,7 @@ def read(clip: Path, arguments: argparse.Namespace) -> Any:
             frame_time_ms=arguments.frame_time_ms,
             cycle=arguments.cycle,
             crop=arguments.crop,
+            part=part,
         )
     except EchoError as error:
-        said = re.sub(r"\b(spacing_mm|frame_time_ms)\b(?=$| =)", lambda name: OPTIONS[name[0]], str(error))
-        raise EchoError(said) from None
+        raise EchoError(_as_options(str(error))) from None

@@ -1,28 +1,36 @@
 """`echotruth track`: strain of one's own echo."""
 
 import argparse
+import csv
 import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from echotruth.cli import recording
-from echotruth.cli.command import fail, named
-
-if TYPE_CHECKING:
-    import pandas as pd
+from echotruth.cli.command import did_you_mean, fail, named
+from echotruth.echo.failure import EchoError
+from echotruth.echo.wall_file import default_output, said
 
 VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short_axis or long_axis without segments"
+
+TRACKERS = (
+    *("as_published", "corrected", "phase_correlation"),
+    *("window_deformation", "affine_dic", "bspline_dic", "dis", "ilk"),
+)
+"""Trackers of a default configuration and methods, which the help names without importing them."""
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth track`."""
-    recording.add(parser, several=True)
+    recording.add(parser, "all", several=True)
     text = (
         "borders of the wall at end-diastole, .csv or mask (default: CLIP with the ending .wall.csv); of one clip only"
     )
     parser.add_argument("--wall", type=Path, help=text)
     parser.add_argument("--view", help=f"{VIEWS} (default: what the .csv says)")
-    parser.add_argument("--tracker", default="bspline_dic", help="method of tracking (default: bspline_dic)")
+    text = f"{', '.join(TRACKERS)}, or package.module:function (default: bspline_dic)"
+    parser.add_argument("--tracker", default="bspline_dic", help=text)
     parser.add_argument("-o", "--output", type=Path, default=Path("strain"), help="folder (default: strain)")
 
 
@@ -30,8 +38,9 @@ def track(arguments: argparse.Namespace) -> int:
     """Track the wall in recorded clips, and take its strain.
 
     Of each clip it writes a page (NAME.png) and its curves (NAME.csv) into the folder, and a row into strain.csv, the
-    table of all clips that are there. The wall is drawn at end-diastole: by `echotruth draw`, or by another program as
-    a table of columns part (endocardium, epicardium, anterior_insertion, inferior_insertion), lateral_px and axial_px.
+    table of all clips that are there. The wall is drawn at end-diastole: by `echotruth draw`, of which the cycle and
+    the crop are taken over, or by another program as a table of columns part (endocardium, epicardium,
+    anterior_insertion, inferior_insertion), lateral_px and axial_px.
 
     examples:
       echotruth track mouse.dcm
@@ -43,42 +52,68 @@ def track(arguments: argparse.Namespace) -> int:
       1  some are not: each is told
       2  none is, or an option is wrong
     """
-    from echotruth.echo.drawing import default_output
-    from echotruth.echo.failure import EchoError
-
     clips: list[Path] = arguments.clip
-    if arguments.wall and len(clips) > 1:
-        return fail(f"--wall {arguments.wall}: suits one clip: name those of {len(clips)} clips CLIP.wall.csv")
     walls = [arguments.wall or default_output(path) for path in clips]
     table = arguments.output / "strain.csv"
     try:
-        before = _rows(table)
-        names = _names(clips, walls, arguments.output, before)
+        _check_options(arguments)
+        names = _names(clips, walls, arguments.output, _sources(table))
     except EchoError as error:
         return fail(str(error))
+    lacking = [_lacking(path, wall, arguments) for path, wall in zip(clips, walls, strict=True)]
+    if all(lacking):
+        return fail("\n".join(lacking))
     arguments.output.mkdir(parents=True, exist_ok=True)
-    rows: list[dict[str, Any]] = []
-    for number, (path, wall, name) in enumerate(zip(clips, walls, names, strict=True), 1):
-        if len(clips) > 1:
-            print(f"{number} of {len(clips)}: {path}", file=sys.stderr)
-        try:
-            rows.append(_tracked(path, wall, name, arguments))
-        except (EchoError, ValueError) as error:
-            print(named(str(error)), file=sys.stderr)
+    rows = list(_rows(zip(clips, walls, names, lacking, strict=True), arguments))
     if not rows:
         return 2
-    _write_table(rows, before, table)
+    _write_table(rows, table)
     return 0 if len(rows) == len(clips) else 1
+
+
+def _check_options(arguments: argparse.Namespace) -> None:
+    """Raise an :class:`EchoError` if one wall is given for several clips, or there is no such tracker."""
+    clips, tracker = len(arguments.clip), arguments.tracker
+    if arguments.wall and clips > 1:
+        raise EchoError(f"--wall {arguments.wall}: suits one clip: name those of {clips} clips CLIP.wall.csv")
+    if ":" not in tracker and tracker not in TRACKERS:
+        otherwise = f"use one of {', '.join(TRACKERS)}, or package.module:function"
+        raise EchoError(f"--tracker {tracker}: {did_you_mean(tracker, TRACKERS, otherwise)}")
+
+
+def _rows(clips: Iterable[tuple[Path, Path, str, str]], arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Track clips, each with its wall, its name and what it lacks; yield a row of each that can be tracked."""
+    several = len(arguments.clip)
+    for number, (path, wall, name, lacks) in enumerate(clips, 1):
+        if several > 1:
+            print(f"{number} of {several}: {path}", file=sys.stderr)
+        try:
+            if lacks:
+                raise EchoError(lacks)
+            yield _tracked(path, wall, name, arguments)
+        except (EchoError, ValueError) as error:
+            print(named(str(error)), file=sys.stderr)
+
+
+def _lacking(clip: Path, wall: Path, arguments: argparse.Namespace) -> str:
+    """What has to be given of a clip and its wall before it is worth reading them, in a sentence; or nothing."""
+    if not clip.exists():
+        return f"{clip}: is not there: give the path of a clip"
+    names = recording.missing(clip, arguments)
+    if not wall.is_file():
+        draw = f"{wall}: is not there: draw the wall (echotruth draw {clip})"
+        return f"{recording.asked(clip, names)}; {draw}" if names else draw
+    if not (arguments.view or said(wall, "view")):
+        names.append("view")
+    return recording.asked(clip, names) if names else ""
 
 
 def _name(clip: str | Path) -> str:
     """Name of a clip without its folder and ending."""
-    from echotruth.echo.drawing import default_output
-
     return default_output(Path(clip)).name.removesuffix(".wall.csv")
 
 
-def _names(clips: list[Path], walls: list[Path], output: Path, before: "pd.DataFrame") -> list[str]:
+def _names(clips: list[Path], walls: list[Path], output: Path, before: list[str]) -> list[str]:
     """Names of what is written of the clips: none may take the place of another, of the table or of what is read.
 
     Raises
@@ -86,9 +121,7 @@ def _names(clips: list[Path], walls: list[Path], output: Path, before: "pd.DataF
     EchoError
         If one would.
     """
-    from echotruth.echo.failure import EchoError
-
-    taken = {_name(source): Path(source) for source in before["source"].astype(str)}
+    taken = {_name(source): Path(source) for source in before}
     kept = {path.resolve() for path in (*clips, *walls, output / "strain.csv")}
     names: list[str] = []
     for path in clips:
@@ -102,27 +135,21 @@ def _names(clips: list[Path], walls: list[Path], output: Path, before: "pd.DataF
     return names
 
 
-def _rows(table: Path) -> "pd.DataFrame":
-    """Rows of clips that were tracked into a folder before.
+def _sources(table: Path) -> list[str]:
+    """Clips that were tracked into a folder before.
 
     Raises
     ------
     EchoError
         If there is another table.
     """
-    import pandas as pd
-
-    from echotruth.echo.failure import EchoError
-
     if not table.exists():
-        return pd.DataFrame({"source": []})
+        return []
     try:
-        rows = pd.read_csv(table)
-    except (OSError, ValueError):
-        rows = pd.DataFrame()
-    if "source" not in rows:
-        raise EchoError(f"{table}: is no table of tracked clips: track into another folder (--output)")
-    return rows
+        with table.open(newline="", encoding="utf-8") as file:
+            return [row["source"] for row in csv.DictReader(file)]
+    except (OSError, ValueError, KeyError, csv.Error):
+        raise EchoError(f"{table}: is no table of tracked clips: track into another folder (--output)") from None
 
 
 def _tracked(path: Path, drawn: Path, name: str, arguments: argparse.Namespace) -> dict[str, Any]:
@@ -132,22 +159,24 @@ def _tracked(path: Path, drawn: Path, name: str, arguments: argparse.Namespace) 
     from echotruth.echo.wall import read_wall
 
     wall = read_wall(drawn, arguments.view)
-    clip = recording.read(path, arguments)
+    clip = recording.read(path, arguments, wall.part)
+    frames = clip.sizes["frame"]
+    print(f"{path}: tracks {frames} frames by {arguments.tracker} ({clip.attrs['part']})", file=sys.stderr)
     strain = speckle_tracking(clip, wall, arguments.tracker)
     page.draw(clip, strain, arguments.output / f"{name}.png")
     page.curves(strain).to_csv(arguments.output / f"{name}.csv", index=False, float_format="%.4f")
     row = page.summary(strain)
-    kind, value = page.global_strain(strain)
     for note in str(strain.attrs["notes"]).splitlines():
         print(named(f"{path}: {note}"), file=sys.stderr)
-    print(f"{path}: {kind} {value:.1f} %, {arguments.output / name}.png")
+    print(f"{path}: {page.headline(strain)}, {arguments.output / name}.png")
     return row
 
 
-def _write_table(rows: list[dict[str, Any]], before: "pd.DataFrame", path: Path) -> None:
+def _write_table(rows: list[dict[str, Any]], path: Path) -> None:
     """Write the table of all clips, in which new rows of a clip take the place of earlier ones."""
     import pandas as pd
 
     tracked = {_name(row["source"]) for row in rows}
-    others = before[[_name(source) not in tracked for source in before["source"].astype(str)]]
-    pd.DataFrame([*others.to_dict("records"), *rows]).to_csv(path, index=False, float_format="%.3f")
+    before = pd.read_csv(path).to_dict("records") if path.exists() else []
+    others = [row for row in before if _name(str(row["source"])) not in tracked]
+    pd.DataFrame([*others, *rows]).to_csv(path, index=False, float_format="%.3f")

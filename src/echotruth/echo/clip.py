@@ -2,6 +2,7 @@
 
 from os import PathLike
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import numpy as np
@@ -9,14 +10,18 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.arrays import Floats
-from echotruth.echo import files
-from echotruth.echo.failure import EchoError
+from echotruth.echo import files, sector
+from echotruth.echo.failure import EchoError, unsaid
 from echotruth.echo.recording import Recording, check_size
+from echotruth.echo.wall_file import Part
+from echotruth.echo.wall_file import part as part_of
 
 SQUARE = 1e-3
 """Relative difference of the sides of a pixel from which an image is resampled to square pixels."""
 SIDES_MM, STEPS_MS = (0.001, 10.0), (0.01, 1000.0)
 """Shortest and longest side of a pixel, and time from frame to frame, of an echo of any heart."""
+FEWEST_FRAMES = 3
+"""Frames of the shortest cycle: end-diastole, end-systole and one between or after."""
 LARGEST_RATIO = 100.0
 """Longer side of a pixel over the shorter."""
 
@@ -27,7 +32,8 @@ def read_clip(
     spacing_mm: float | None = None,
     frame_time_ms: float | None = None,
     cycle: tuple[int, int] | None = None,
-    crop: tuple[int, int, int, int] | None = None,
+    crop: tuple[int, int, int, int] | Literal["sector"] | None = None,
+    part: str = "",
 ) -> xr.Dataset:
     """Read a recorded clip.
 
@@ -46,20 +52,24 @@ def read_clip(
     cycle : tuple of int, optional
         First frame, at end-diastole, and the frame after the last. Default: from the first R wave to the next where
         the file has two, else the whole clip.
-    crop : tuple of int, optional
-        Part of the image: left, top, right, bottom, px of the file's region. Default: all.
+    crop : tuple of int or "sector", optional
+        Part of the image: left, top, right, bottom, px of the file's region; or what of it changes over the frames,
+        without the writing about it. Default: all.
+    part : str, optional
+        Cycle and crop of the clip in which a wall was drawn, as its attribute `part` says, where neither is given.
 
     Returns
     -------
     Dataset
         `image` (frame, axial, lateral), uint8, with the coordinates time (s), axial and lateral (m), and the attributes
-        `source`, `spacing` (m) and `part`: the first frame and pixel of the file that it holds.
+        `source`, `spacing` (m) and `part`: the frames and pixels of the file that it holds, as "cycle 31 59, crop 120
+        40 520 440".
 
     Raises
     ------
     EchoError
-        If it is no clip, its levels are not finite, or its spacing or frame time is neither given nor in the file, or
-        is that of no echo: beyond 0.001 to 10 mm, or 0.01 to 1000 ms.
+        If it is no clip of three frames or more, its levels are not finite, or its spacing or frame time is neither
+        given nor in the file, or is that of no echo: beyond 0.001 to 10 mm, or 0.01 to 1000 ms.
 
     Examples
     --------
@@ -73,11 +83,17 @@ def read_clip(
     name = str(source) if is_path else "array"
     with np.errstate(all="ignore"):  # whatever is not finite is told below
         recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
+        _check_said(recording, spacing_mm, frame_time_ms, name)
         time = _time(recording, frame_time_ms, name)
+    if drawn := part_of(part):
+        cycle, crop = cycle or drawn.cycle, crop or drawn.crop
     first, stop = _cycle(recording, time, cycle, name)
     height, width = recording.frames.shape[1:]
-    left, top, right, bottom = crop or (0, 0, width, height)
-    frames = _cropped(recording.frames[first:stop], (left, top, right, bottom), name)
+    if crop == "sector":
+        crop = sector.find(recording.frames)
+    crop = crop or (0, 0, width, height)
+    shown = Part((first, stop), (crop[0], crop[1], crop[2], crop[3]))
+    frames = _cropped(recording.frames[first:stop], shown.crop, name)
     frames, spacing = _square(frames, _spacing(recording, spacing_mm, name))
     axial, lateral = (np.arange(size) * spacing for size in frames.shape[1:])
     return xr.Dataset(
@@ -88,8 +104,17 @@ def read_clip(
             "axial": ("axial", axial, {"units": "m", "long_name": "distance from the first row"}),
             "lateral": ("lateral", lateral, {"units": "m", "long_name": "distance from the first column"}),
         },
-        attrs={"source": name, "spacing": spacing, "part": f"from frame {first}, column {left} and row {top} on"},
+        attrs={"source": name, "spacing": spacing, "part": str(shown)},
     )
+
+
+def _check_said(recording: Recording, spacing_mm: float | None, frame_time_ms: float | None, name: str) -> None:
+    """Raise an :class:`EchoError` that asks for all that neither the file nor an option says."""
+    has_spacing = recording.spacing and min(recording.spacing) > 0
+    missing = [] if has_spacing or spacing_mm is not None else ["spacing_mm"]
+    missing += [] if len(recording.time) or frame_time_ms is not None else ["frame_time_ms"]
+    if missing:
+        raise EchoError(unsaid(name, missing))
 
 
 def _time(recording: Recording, frame_time_ms: float | None, name: str) -> Floats:
@@ -97,8 +122,6 @@ def _time(recording: Recording, frame_time_ms: float | None, name: str) -> Float
     if frame_time_ms is not None:
         _check_within(STEPS_MS, frame_time_ms, f"frame_time_ms = {frame_time_ms:g}: give a time")
         return np.arange(len(recording.frames), dtype=float) * frame_time_ms * 1e-3
-    if not len(recording.time):
-        raise EchoError(f"{name}: does not say the time from frame to frame: give frame_time_ms")
     steps = 1e3 * np.diff(recording.time)
     if not (steps > 0).all():
         raise EchoError(f"{name}: has frames of which the times do not increase: give frame_time_ms")
@@ -118,8 +141,6 @@ def _spacing(recording: Recording, spacing_mm: float | None, name: str) -> tuple
     if spacing_mm is not None:
         _check_within(SIDES_MM, spacing_mm, f"spacing_mm = {spacing_mm:g}: give a side")
         return spacing_mm * 1e-3, spacing_mm * 1e-3
-    if not recording.spacing or not min(recording.spacing) > 0:
-        raise EchoError(f"{name}: does not say the side of its pixels: give spacing_mm")
     axial, lateral = recording.spacing
     sides = f"{name}: has pixels of {1e3 * axial:g} x {1e3 * lateral:g} mm"
     for side in recording.spacing:
@@ -132,13 +153,15 @@ def _spacing(recording: Recording, spacing_mm: float | None, name: str) -> tuple
 def _cycle(recording: Recording, time: Floats, cycle: tuple[int, int] | None, name: str) -> tuple[int, int]:
     """First frame of the cycle and the frame after its last."""
     frames = len(recording.frames)
+    if frames < FEWEST_FRAMES:
+        raise EchoError(f"{name}: has {frames} frame{'s' * (frames > 1)}: a clip needs {FEWEST_FRAMES} or more")
     if cycle is None and len(recording.r_waves) > 1:
         waves = np.searchsorted(time, recording.r_waves[:2] - 1e-9)
         cycle = (int(waves[0]), int(waves[1]))
-        cycle = cycle if cycle[1] - cycle[0] > 1 else (0, frames)
+        cycle = cycle if cycle[1] - cycle[0] >= FEWEST_FRAMES else (0, frames)
     first, stop = cycle or (0, frames)
-    if not 0 <= first < first + 1 < stop <= frames:
-        raise EchoError(f"cycle = {first}, {stop}: give two or more of the {frames} frames of {name}")
+    if not 0 <= first <= stop - FEWEST_FRAMES <= frames - FEWEST_FRAMES:
+        raise EchoError(f"cycle = {first}, {stop}: give {FEWEST_FRAMES} or more of the {frames} frames of {name}")
     return first, stop
 
 

@@ -43,7 +43,7 @@ def read(path: Path) -> Recording:
         raise EchoError(f"{path}: is no DICOM clip that can be decoded: {one_line(error)}") from None
     colours = int(getattr(image, "SamplesPerPixel", 1)) > 1
     if pixels.ndim != 3 + colours:
-        raise EchoError(f"{path}: holds one image: give a clip of two or more frames")
+        raise EchoError(f"{path}: has 1 frame: a clip needs 3 or more")
     try:
         return _recording(image, pixels, path)
     except EchoError:

@@ -26,6 +26,7 @@ let part = "endocardium";  // what is clicked
 let selected = null;  // {part, index}
 let dragged = false;
 let frame = 0;
+let cycle = [0, 0];  // end-diastole, and the next: the frame after the last of the cycle
 let player = null;
 let unsaved = false;
 
@@ -79,10 +80,10 @@ function drawFrame(context) {
 function drawPart(context, name) {
   context.strokeStyle = context.fillStyle = PARTS[name].colour;
   context.lineWidth = 2;
-  context.setLineDash(frame ? [4, 4] : []);  // it belongs to the first frame
+  context.setLineDash(frame === cycle[0] ? [] : [4, 4]);  // it belongs to end-diastole
   if (BORDERS.includes(name)) drawCurve(context, curve(points[name], isClosed()));
   context.setLineDash([]);
-  if (!frame) points[name].forEach((point, index) => drawPoint(context, name, point, index));
+  if (frame === cycle[0]) points[name].forEach((point, index) => drawPoint(context, name, point, index));
 }
 
 function drawCurve(context, line) {
@@ -189,7 +190,7 @@ let kept = null;  // points before they are dragged
 function press(event) {
   if (event.button !== 0 && event.button !== 2) return;
   canvas.focus();
-  if (frame || player) return goTo(0);  // what is drawn belongs to the first frame
+  if (frame !== cycle[0] || player) return goTo(cycle[0]);  // what is drawn belongs to end-diastole
   const hit = pointAt(event);
   if (event.button === 2 || event.ctrlKey) return change(() => remove(hit));  // Ctrl and click, on a Mac
   kept = JSON.stringify(points);
@@ -236,14 +237,34 @@ function showFrame(number) {
   frame = window.echotruth.frame = number;
   element("frame").value = number;
   const time = clip.time_ms[number].toFixed(1);
-  element("time").textContent = `frame ${number} / ${clip.frames - 1}, ${time} ms`;
+  const name = number === cycle[0] ? ", end-diastole" : number === cycle[1] ? ", next end-diastole" : "";
+  element("time").textContent = `frame ${number} / ${clip.frames - 1}, ${time} ms${name}`;
   draw();
 }
 
 function play() {
-  if (player) return goTo(0);
+  if (player) return goTo(cycle[0]);
   player = setInterval(() => showFrame((frame + 1) % clip.frames), FRAME_MS);
   show();
+}
+
+// The cycle goes on to the end of the clip unless there is a next end-diastole after the one that is chosen.
+function begin_cycle() {
+  const least = clip.fewest_frames;
+  if (frame > clip.frames - least) return say(`A cycle needs ${least} frames: choose an earlier one.`, "error");
+  set_cycle(frame, cycle[1] < frame + least ? clip.frames : cycle[1]);
+}
+
+function end_cycle() {
+  const least = clip.fewest_frames;
+  if (frame < cycle[0] + least) return say(`Choose a frame ${least} or more after end-diastole, ${cycle[0]}.`, "error");
+  set_cycle(cycle[0], frame);
+}
+
+function set_cycle(...frames) {
+  cycle = frames;
+  unsaved = true;
+  goTo(frame);
 }
 
 // One after the other, so that the first is there at once.
@@ -268,7 +289,9 @@ function showFile(isThere) {
 }
 
 function hint() {
-  if (frame || player) return "The wall is drawn in frame 0: click the image to go back to it.";
+  if (frame !== cycle[0] || player) {
+    return `The wall is drawn in frame ${cycle[0]}, at end-diastole: click the image to go back to it.`;
+  }
   if (!BORDERS.includes(part)) {
     return `Click where the right ventricle joins the wall at its ${part.split("_")[0]} side.`;
   }
@@ -286,6 +309,8 @@ function show() {
   element("undo").disabled = !before.length;
   element("delete").disabled = !selected;
   element("clear").disabled = !points[part].length;
+  element("first").setAttribute("aria-pressed", frame === cycle[0]);
+  element("next").setAttribute("aria-pressed", frame === cycle[1]);
   element("play").textContent = player ? "❚❚ Stop" : "▶ Play";
   say(hint());
   draw();
@@ -296,7 +321,7 @@ function show() {
 function drawn() {
   const [anterior, inferior] = Object.keys(PARTS).slice(2).map(name => (isClosed() ? points[name][0] ?? null : null));
   const borders = Object.assign({}, ...BORDERS.map(border));
-  return {view: view(), ...borders, anterior_insertion: anterior, inferior_insertion: inferior};
+  return {view: view(), cycle, ...borders, anterior_insertion: anterior, inferior_insertion: inferior};
 }
 
 // A border as it is shown, and which of its points were clicked.
@@ -349,7 +374,8 @@ function listen() {
   addEventListener("keydown", key);
   addEventListener("beforeunload", event => unsaved && event.preventDefault());
   new ResizeObserver(draw).observe(canvas);
-  const clicks = {undo, play, save, delete: () => change(() => remove(selected)), clear: () => change(clear)};
+  const clicks = {undo, play, save, delete: () => change(() => remove(selected)), clear: () => change(clear),
+    first: begin_cycle, next: end_cycle};
   for (const [id, act] of Object.entries(clicks)) element(id).onclick = act;
   element("frame").oninput = event => goTo(Number(event.target.value));
   element("view").onchange = () => { unsaved = true; show(); };
@@ -373,7 +399,8 @@ async function open() {
   showFile(clip.replaces);
   begin(clip.wall);
   listen();
-  goTo(0);
+  cycle = clip.cycle;
+  goTo(cycle[0]);
   await loadFrames();
 }
 

@@ -1,7 +1,6 @@
 """The page on which the wall of a ventricle is drawn in a clip, served to this machine alone."""
 
 import json
-import os
 import re
 import signal
 import sys
@@ -19,8 +18,10 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from echotruth.echo.clip import FEWEST_FRAMES
 from echotruth.echo.failure import EchoError
-from echotruth.echo.wall import PARTS, View, Wall, clicked_points, read_wall, said, write_wall
+from echotruth.echo.wall import PARTS, View, Wall, clicked_points, read_wall, write_wall
+from echotruth.echo.wall_file import Part, part, said
 
 LOCAL = "127.0.0.1"
 
@@ -55,7 +56,8 @@ Border = Annotated[list[Point], Field(max_length=10_000)]
 class Drawn(BaseModel):
     """What the page sends: a view, borders as points at about 1 px, of which some were clicked, and insertions.
 
-    Points are lateral and axial, px; of those that were clicked the number along the border is given.
+    Points are lateral and axial, px; of those that were clicked the number along the border is given. End-diastole and
+    the next one are frames of the clip that is shown; the next may be the frame after its last.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
@@ -67,11 +69,12 @@ class Drawn(BaseModel):
     epicardium_clicked: Annotated[list[int], Field(max_length=10_000)] = []
     anterior_insertion: Point | None = None
     inferior_insertion: Point | None = None
+    cycle: tuple[int, int] | None = None
 
 
 @dataclass
 class Drawing:
-    """A clip, and the wall that is drawn in its first frame.
+    """A clip, and the wall that is drawn in it at end-diastole.
 
     Attributes
     ----------
@@ -114,6 +117,20 @@ class Drawing:
         # The page asks for the view of a file that names none.
         return read_wall(self.begin, said(self.begin, "view") or "short_axis")
 
+    @property
+    def _shown(self) -> Part:
+        """Frames and pixels of the recording that the page shows."""
+        frames, axial, lateral = self.clip["image"].shape
+        return part(self.clip.attrs.get("part", "")) or Part((0, frames), (0, 0, lateral, axial))
+
+    def _cycle(self, wall: Wall | None) -> tuple[int, int]:
+        """Frames of the page at end-diastole and the next: those of the wall, or the first and the end of the clip."""
+        start, stop = self._shown.cycle
+        drawn = part(wall.part) if wall else None
+        if drawn and start <= drawn.cycle[0] < drawn.cycle[1] <= stop:
+            return drawn.cycle[0] - start, drawn.cycle[1] - start
+        return 0, stop - start
+
     def _clicked(self) -> dict[str, list[list[float]]]:
         """Points that were clicked, of the borders of which the file says them."""
         if self.begin is None or self.begin.suffix.lower() != ".csv" or not self.begin.is_file():
@@ -128,6 +145,8 @@ class Drawing:
             "output": str(self.output),
             "replaces": self.output.exists(),
             "frames": self.clip.sizes["frame"],
+            "cycle": self._cycle(wall),
+            "fewest_frames": FEWEST_FRAMES,
             "width": self.shape[1],
             "height": self.shape[0],
             "spacing_mm": 1e3 * self.clip.attrs["spacing"],
@@ -180,14 +199,11 @@ class Drawing:
             raise EchoError(f"{PARTS[2 + given.index(None)]}: is missing: click both insertions, or none")
         insertions = None if None in given else np.array(given)
         borders = np.array(drawn.endocardium), np.array(drawn.epicardium)
-        return Wall(*borders, drawn.view, insertions, self.clip.attrs.get("part", ""))
-
-
-def default_output(clip: Path) -> Path:
-    """The .csv beside a clip: `patient.wall.csv` of patient.dcm, `FOLDER.wall.csv` of a folder of images."""
-    whole = Path(os.path.abspath(clip))  # "." has a name too, and a link stays where it is
-    ending = r"$" if whole.is_dir() else r"(\.nii\.gz|\.[^.]*)?$"
-    return whole.with_name(re.sub(ending, ".wall.csv", whole.name, count=1, flags=re.IGNORECASE))
+        first, stop = drawn.cycle or (0, self.clip.sizes["frame"])
+        if not 0 <= first <= stop - FEWEST_FRAMES <= self.clip.sizes["frame"] - FEWEST_FRAMES:
+            raise EchoError(f"cycle: frames {first} to {stop} are none of {FEWEST_FRAMES} or more frames of the clip")
+        start = self._shown.cycle[0]
+        return Wall(*borders, drawn.view, insertions, str(Part((start + first, start + stop), self._shown.crop)))
 
 
 def _points(wall: Wall) -> dict[str, list[list[float]]]:

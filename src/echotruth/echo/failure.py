@@ -4,9 +4,22 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+FACTS = {"spacing_mm": "the side of its pixels", "frame_time_ms": "the time from frame to frame", "view": "its view"}
+"""Options that say what a file may not, and what that is."""
+
 
 class EchoError(ValueError):
     """Raised if a clip or a wall cannot be used; the message names the file, what is wrong and what would be right."""
+
+
+def unsaid(name: object, missing: list[str]) -> str:
+    """Sentence that asks for all facts (keys of :data:`FACTS`) that a file does not say."""
+    facts, options = ([*map(FACTS.get, missing)], missing)
+    return f"{name}: does not say {_listed(facts)}: give {_listed(options)}"
+
+
+def _listed(words: list[Any]) -> str:
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
 def one_line(error: Exception) -> str:

@@ -54,8 +54,8 @@ def _folder(path: Path) -> Recording:
     images = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and file.is_file())
     files = sorted(images, key=natural_order)
     frames = [(file, page) for file in files for page in _pages(file)]
-    if len(frames) < 2:
-        raise EchoError(f"{path}: has {len(frames)} images: a clip needs two or more ({', '.join(IMAGES)})")
+    if not frames:
+        raise EchoError(f"{path}: has no images: a clip needs 3 or more ({', '.join(IMAGES)})")
     return _clip(frames, path)
 
 

@@ -11,6 +11,14 @@ from echotruth.report import style
 
 COLOURS = ("#f5b942", "#5ec8d8", "#e0607e")
 """Of the endocardial, middle and epicardial line."""
+DOUBT = "#b3261e"
+"""Of what is said of a doubtful strain."""
+
+
+def headline(strain: xr.Dataset) -> str:
+    """Global strain of a tracked view in words, and that it is doubtful where there are notes."""
+    name, value = global_strain(strain)
+    return f"{name} {value:.1f} %" + (" (doubtful)" if strain.attrs["notes"] else "")
 
 
 def global_strain(strain: xr.Dataset) -> tuple[str, float]:
@@ -62,6 +70,7 @@ def summary(strain: xr.Dataset) -> dict[str, object]:
     -------
     dict
         source, view, tracker; `gcs_percent` and `gls_percent` of the middle line at end-systole, one of them NaN;
+        `doubtful`, whether there are notes;
         `end_systole_ms`; `coverage_percent`, the share of points with an estimate there; `quality`, the mean of these
         points; `drift_percent`; `notes`.
     """
@@ -71,6 +80,7 @@ def summary(strain: xr.Dataset) -> dict[str, object]:
     return {
         **{name: attributes[name] for name in ("source", "view", "tracker")},
         **{name: attributes.get(name, np.nan) for name in ("gcs_percent", "gls_percent")},
+        "doubtful": bool(attributes["notes"]),
         "end_systole_ms": 1e3 * attributes["end_systole"],
         "coverage_percent": 100 * float(known.mean()),
         "quality": float(quality[known].mean()) if known.any() else np.nan,
@@ -92,7 +102,7 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
         PNG to write.
     """
     figure = style.figure(11, 7.6)
-    figure.suptitle(_title(strain), fontsize=10)
+    figure.suptitle(_title(strain), fontsize=10, color=DOUBT if strain.attrs["notes"] else None)
     panels = figure.add_gridspec(2, 6, height_ratios=[1.2, 1])
     frames = {"end-diastole": 0, "end-systole": strain.attrs["es_frame"], "last frame": strain.sizes["frame"] - 1}
     for column, (name, frame) in enumerate(frames.items()):
@@ -105,15 +115,15 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
     lines.set_ylabel(f"{global_strain(strain)[0]} (%)")
     segments.set_ylabel("strain of AHA segments (%)")
     if strain.attrs["notes"]:
-        figure.supxlabel(strain.attrs["notes"], fontsize=9, color="#b3261e")
+        figure.supxlabel(strain.attrs["notes"], fontsize=9, color=DOUBT)
     figure.savefig(path, dpi=110)
 
 
 def _title(strain: xr.Dataset) -> str:
     """One line: the clip, its global strain, and how far to trust it."""
     row = summary(strain)
-    (name, value), where = global_strain(strain), f"{row['end_systole_ms']:.0f} ms"
-    first = f"{Path(str(row['source'])).name}, {row['view']}: {name} {value:.1f} % at end-systole ({where})"
+    where = f"at end-systole, {row['end_systole_ms']:.0f} ms"
+    first = f"{Path(str(row['source'])).name}, {row['view']}: {headline(strain)} {where}"
     rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {row['quality']:.2f}"
     return f"{first}; {row['tracker']}, {rest}"
 

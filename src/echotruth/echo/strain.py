@@ -13,6 +13,7 @@ from echotruth.config.defaults import REFERENCE_FIELD_OF_VIEW_MM
 from echotruth.config.tracking import Tracking
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import LAYERS, Wall
+from echotruth.echo.wall_file import part
 from echotruth.evaluation import statistics
 from echotruth.evaluation.contours import Contours
 from echotruth.evaluation.courses import motion_courses, strain_courses
@@ -102,6 +103,7 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     """
     frames, spacing = _frames(clip)
     _check_part(clip, wall)
+    wall.check_within(frames.shape[1:])
     mask = wall.mask(frames.shape[1:])
     scale = _scale(wall, spacing)
     points = _points(mask, spacing, scale)
@@ -138,10 +140,11 @@ def _frames(clip: xr.Dataset) -> tuple[NDArray[np.uint8], float]:
 
 
 def _check_part(clip: xr.Dataset, wall: Wall) -> None:
-    part = clip.attrs.get("part", "")
-    if part and wall.part and part != wall.part:
+    drawn, shown = part(wall.part), part(clip.attrs.get("part", ""))
+    if drawn and shown and drawn.start != shown.start:
         raise EchoError(
-            f"the wall was drawn in the clip {wall.part}, and this clip is {part}: give the same cycle and crop"
+            f"the wall was drawn in a clip of {drawn}, and this clip is {shown}: let both begin at the same frame and "
+            "pixel"
         )
 
 

@@ -1,6 +1,5 @@
 """The wall of a ventricle in an image, as drawn at end-diastole: its borders, directions, layers and AHA segments."""
 
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
@@ -19,6 +18,7 @@ from echotruth import files
 from echotruth.arrays import Floats
 from echotruth.echo.failure import EchoError, one_line
 from echotruth.echo.files import of_image
+from echotruth.echo.wall_file import said
 
 View = Literal["basal", "mid", "apical", "four_chamber", "two_chamber", "three_chamber", "short_axis", "long_axis"]
 """Views: three levels of the short axis, three apical views in the usual display, and either without AHA segments."""
@@ -46,6 +46,9 @@ MASK_BLUR_PX = 2.0
 STEP = 0.25
 """Distance of points along a border from which directions and depth are found, px."""
 
+OUTSIDE_PX = 2.0
+"""Distance from the centres of the outermost pixels up to which a border may be outside the image, px."""
+
 LAYERS = 3
 """Layers of the wall: of the endocardium, the middle and the epicardium."""
 
@@ -65,8 +68,10 @@ class Wall:
         Where the right ventricle joins the wall of a short axis: anterior, inferior. Without them there are no
         segments.
     part : str
-        First frame and pixel of the clip in which it was drawn, as its attribute `part` says; "" where that is not
-        known.
+        Frames and pixels of the clip in which it was drawn, as its attribute `part` says, of which the first frame is
+        end-diastole; "" where that is not known.
+    mask_shape : tuple of int, optional
+        Axial and lateral size of the mask that it was traced from, px.
 
     Raises
     ------
@@ -89,6 +94,7 @@ class Wall:
     view: str = "short_axis"
     insertions: Floats | None = None
     part: str = ""
+    mask_shape: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         _check_view(self.view)
@@ -104,6 +110,18 @@ class Wall:
     def plane(self) -> str:
         """`short_axis` or `long_axis`."""
         return "long_axis" if self.view in (*LEFT_AND_RIGHT, "long_axis") else "short_axis"
+
+    def check_within(self, shape: tuple[int, int]) -> None:
+        """Raise an :class:`EchoError` if it is not within an image of some size (axial, lateral), px."""
+        image = f"{shape[1]} x {shape[0]} px"
+        if self.mask_shape not in (None, shape):
+            size = f"{self.mask_shape[1]} x {self.mask_shape[0]} px"  # type: ignore[index]
+            raise EchoError(f"the mask of the wall has {size}, and the image {image}: give one of the same image")
+        points = np.concatenate([self.endocardium, self.epicardium])
+        (left, top), (right, bottom) = points.min(axis=0), points.max(axis=0)
+        if min(left, top) < -OUTSIDE_PX or right > shape[1] - 1 + OUTSIDE_PX or bottom > shape[0] - 1 + OUTSIDE_PX:
+            place = f"columns {left:.0f} to {right:.0f} and rows {top:.0f} to {bottom:.0f}"
+            raise EchoError(f"the wall has {place}, and the image {image}: give borders in px of the clip, within it")
 
     def mask(self, shape: tuple[int, int]) -> NDArray[np.bool_]:
         """Pixels of the wall.
@@ -279,19 +297,6 @@ def _check_view(view: str) -> None:
         raise EchoError(f"view = {view!r}: use one of {', '.join(get_args(View))}")
 
 
-def said(file: Path, what: str) -> str | None:
-    """What the comments with which a .csv begins say of its `view` or of the `part` of the clip, or None."""
-    if file.suffix.lower() != ".csv" or not file.is_file():
-        return None
-    with file.open(encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            if not line.startswith("#"):
-                break
-            if match := re.fullmatch(rf"#\s*{what}\s*:\s*(\S.*?)\s*", line):
-                return match[1]
-    return None
-
-
 def clicked_points(file: Path) -> dict[str, Floats]:
     """Points (n, 2), px, through which each border of a .csv was drawn; none of a border where the file does not say.
 
@@ -370,7 +375,7 @@ def _of_mask(mask: NDArray[np.bool_], view: str) -> Wall:
     # Outlines along the edges of pixels would be some 5 % too long.
     smooth = (gaussian_filter(part.astype(float), MASK_BLUR_PX) for part in (cavity, whole))
     inner, outer = (max(find_contours(part, 0.5), key=len)[:-1, ::-1] - margin for part in smooth)
-    return Wall(inner, outer, view)
+    return Wall(inner, outer, view, mask_shape=(mask.shape[0], mask.shape[1]))
 
 
 def _filled(outline: Floats, shape: tuple[int, int]) -> NDArray[np.bool_]:

@@ -1,5 +1,5 @@
 // Keeps the address of the page in step with what is shown, so that it can be sent to others.
 const query = new URLSearchParams(address.data.query[0]);
-if (slider.value > 0) query.set("frame", slider.value);
+if (!button.active) query.set("frame", slider.value); // an address without it plays
 const text = query.toString();
 history.replaceState(null, "", text ? `?${text}` : location.pathname);

@@ -1,4 +1,4 @@
-"""Arrows over the wall: true and tracked motion since end-diastole, and the flow to the next frame."""
+"""Lines over the wall: true and tracked paths since end-diastole, and the flow to the next frame as arrows."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from echotruth.viewer.points import Points
 from echotruth.viewer.tint import nice
 
 ALONG_SIDE = 34
-"""Arrows along the side of an image that is all wall."""
+"""Paths or arrows along the side of an image that is all wall."""
 FLOW_SHARE = 0.04
 """Length that the longest arrows of the flow are drawn with at least, as a share of the side."""
 MILLIMETRES = 1e3
@@ -18,12 +18,12 @@ MILLIMETRES = 1e3
 
 @dataclass(frozen=True)
 class Arrows:
-    """Arrows of a clip.
+    """Arrows of a clip, or steps of paths, of which those to the frame of the picture are drawn together.
 
     Attributes
     ----------
     start, end : ndarray of shape (frame, n, 2), float32
-        Lateral, axial, mm; NaN where there is no arrow.
+        Lateral, axial, mm; NaN where there is none.
     scale : float
         How many times as long as the motion they are drawn.
     """
@@ -34,25 +34,24 @@ class Arrows:
 
 
 def true_motion(points: Points) -> Arrows:
-    """From where points of the tissue were at end-diastole to where they are."""
-    return _since_ed(points, points.true_displacement)
+    """Paths of points of the tissue since end-diastole."""
+    return _paths(points, points.true_displacement)
 
 
 def tracked_motion(points: Points, tracker: str) -> Arrows:
-    """From the same points to where a tracker finds them."""
-    return _since_ed(points, points.tracked_displacement(tracker))
+    """Paths of the same points as a tracker finds them."""
+    return _paths(points, points.tracked_displacement(tracker))
 
 
-def _since_ed(points: Points, displacement: NDArray[np.float64]) -> Arrows:
+def _paths(points: Points, displacement: NDArray[np.float64]) -> Arrows:
     chosen = _thinned(points)
-    start = np.broadcast_to(points.position, displacement.shape)[:, chosen]
-    end = start + displacement[:, chosen]
-    start = np.where(np.isfinite(end), start, np.nan)
+    end = points.position[chosen] + displacement[:, chosen]
+    start = np.concatenate([points.position[None, chosen], end[:-1]])
     return Arrows(_in_mm(start), _in_mm(end))
 
 
 def _thinned(points: Points) -> NDArray[np.bool_]:
-    """Which of the points have an arrow."""
+    """Which of the points have a path."""
     step = max(1, round(points.clip.side / ALONG_SIDE / points.spacing))
     row, column = np.nonzero(points.inside)
     return (row % step == step // 2) & (column % step == step // 2)

@@ -1,6 +1,6 @@
 """What a viewer has chosen to see, the inputs for it, and the address that says so."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from urllib.parse import urlencode
 
@@ -36,6 +36,8 @@ class Choice:
     measure : {"engineering", "green_lagrange"}
     part : str
         Part of the wall of the curves, as "middle" (a contour), "wall", "layer 1" or "segment 7".
+    frame : int or None
+        Frame at which the clip stands; None if it plays.
     """
 
     case: str
@@ -43,17 +45,17 @@ class Choice:
     size: int
     tracker: str
     other: str = NOTHING
-    colour: str = "none"
+    colour: str = "strain"
     component: str = ""
     curve: str = LINE
     measure: str = "engineering"
     part: str = MIDDLE
-    frame: int = 0
+    frame: int | None = None
 
     @property
     def address(self) -> str:
         """The choice as the query of an address; what is as it would be without it is left out."""
-        plain = {field.name: field.default for field in fields(self)} | {"frame": self.frame}
+        plain = {field.name: field.default for field in fields(self)} | {"frame": self.frame}  # the browser adds it
         return urlencode({name: value for name, value in asdict(self).items() if value != plain[name]})
 
 
@@ -64,8 +66,10 @@ def first(repository: Repository) -> Choice:
     return Choice(case, repository.views[0], repository.sizes[0], repository.trackers[-1])
 
 
-def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> Choice:
-    """What an address asks for; what it does not say, or what the repository does not have, is as at first.
+def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> tuple[Choice, str]:
+    """What an address asks for, and what of it the repository does not have, in a sentence.
+
+    What it does not say, or what is not there, is as at first.
 
     Parameters
     ----------
@@ -74,15 +78,17 @@ def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> Choice:
         Name -> values, as `urllib.parse.parse_qs` gives them.
     """
     given = {name: values[-1] for name, values in query.items() if values}
-    known = {name: value for name, value in given.items() if _is_known(repository, name, value)}
+    known = {name: value for name, value in given.items() if value in _known(repository, name)}
     chosen = {name: int(value) if name in ("size", "frame") else value for name, value in known.items()}
-    return replace(first(repository), **chosen)  # type: ignore[arg-type]  # each has its type
+    choice = replace(first(repository), **chosen)  # type: ignore[arg-type]  # each has its type
+    unknown = [f"{name} {given[name]!r}" for name in asdict(choice) if name in given and name not in known]
+    return choice, f"There is no {', no '.join(unknown)} here: see the lists for what there is." if unknown else ""
 
 
-def _is_known(repository: Repository, name: str, value: str) -> bool:
-    if name == "case":
-        return value in repository.rows
-    known = {
+def _known(repository: Repository, name: str) -> Container[str]:
+    """Values that a part of an address can have."""
+    known: dict[str, Container[str]] = {
+        "case": repository.rows,
         "view": repository.views,
         "size": list(map(str, repository.sizes)),
         "tracker": repository.trackers,
@@ -94,7 +100,7 @@ def _is_known(repository: Repository, name: str, value: str) -> bool:
         "part": [*CONTOURS, WALL, *(f"layer {n}" for n in range(1, 99)), *(f"segment {n}" for n in range(1, 18))],
         "frame": list(map(str, range(repository.config.loop.frames))),
     }
-    return value in known.get(name, ())
+    return known.get(name, ())
 
 
 def inputs(repository: Repository, choice: Choice) -> dict[str, InputWidget]:

@@ -1,4 +1,4 @@
-// Draws the frame that the slider says: the pictures with their colours, the arrows, and the lines in the curves.
+// Draws the frame that the slider says: the pictures with their colours, paths and arrows, and the lines in the curves.
 // Arguments: slider, opacity (sliders); clip {grey}, times {time, text}; and for each panel, in lists, colours {index},
 // palettes {red, green, blue}, pictures {image}, labels, figures; movements and arrows, in pairs; cursors; and side, mm.
 const state = (window.echotruth ??= { drawn: 0, pending: false, tables: [] });
@@ -11,7 +11,7 @@ if (!state.pending) {
     figures.forEach((figure, panel) => {
       if (!figure.visible) return; // drawn while hidden, a figure is laid out anew every time
       draw_picture(pictures[panel], panel, frame);
-      for (let n = panel * kinds; n < (panel + 1) * kinds; n++) draw_arrows(movements[n], arrows[n], frame);
+      for (let n = panel * kinds; n < (panel + 1) * kinds; n++) draw_motion(movements[n], arrows[n], frame);
     });
     cursors.forEach((cursor) => { set(cursor, { location: times.data.time[frame] }); });
     labels.forEach((label, panel) => { if (figures[panel].visible) set(label, { text: times.data.text[frame] }); });
@@ -63,19 +63,20 @@ function blended(panel) {
   return table;
 }
 
-function draw_arrows(movement, shown, frame) {
+// A path is all its steps up to the frame, with a dot where the point is; an arrow is that of the frame alone.
+function draw_motion(movement, shown, frame) {
   const { x0, y0, x1, y1 } = movement.data;
   if (x0.length === 0 && shown.data.x0.length === 0) return;
-  const count = Math.round(x0.length / times.data.time.length);
-  const from = frame * count;
+  const is_path = movement.tags.includes("path");
+  const points = Math.round(x0.length / times.data.time.length);
+  const from = is_path ? 0 : frame * points, count = (frame + 1) * points - from;
   const [start_x, start_y, end_x, end_y] = [x0, y0, x1, y1].map((all) => part(Float32Array, all, from, count));
-  const angle = new Float32Array(count), head_x = new Float32Array(count), tail_x = new Float32Array(count);
-  for (let i = 0; i < count; i++) {
-    const dx = end_x[i] - start_x[i], dy = end_y[i] - start_y[i], length = Math.hypot(dx, dy) / side.value;
+  const angle = new Float32Array(count), head_x = new Float32Array(count).fill(NaN);
+  for (let i = count - points; i < count; i++) {
+    const dx = end_x[i] - start_x[i], dy = end_y[i] - start_y[i];
     angle[i] = Math.atan2(-dy, dx) - Math.PI / 2; // depth is downwards, and a triangle points up
-    head_x[i] = length < 0.008 ? NaN : end_x[i];
-    tail_x[i] = length < 0.002 ? NaN : start_x[i];
+    if (is_path || Math.hypot(dx, dy) > 0.008 * side.value) head_x[i] = end_x[i];
   }
-  Object.assign(shown.data, { x0: tail_x, y0: start_y, x1: end_x, y1: end_y, head_x, angle });
+  Object.assign(shown.data, { x0: start_x, y0: start_y, x1: end_x, y1: end_y, head_x, angle });
   shown.change.emit();
 }

@@ -10,7 +10,8 @@ from echotruth.viewer.curves import TRUE, Plot
 COLOURS = ("#111111", "#1f77b4", "#d55e00", "#009e73")
 """Of the true curve, and of those of trackers."""
 _COLUMNS = tuple(f"y{number}" for number in range(len(COLOURS)))
-WIDTH, HEIGHT = 430, 180
+HEIGHT = 180
+"""Of a graph on the screen until the window's is known, px."""
 
 
 class Graph:
@@ -29,8 +30,8 @@ class Graph:
         self._es = Span(**upright, line_color="#999999", line_dash="dashed", visible=False)
         self.source = ColumnDataSource({name: [] for name in ("time", *_COLUMNS)}, name=f"curves_{name}")
         self.figure = figure(
-            width=WIDTH,
             height=HEIGHT,
+            sizing_mode="stretch_width",
             x_range=Range1d(0, 1),
             y_range=Range1d(0, 1),
             tools="",

@@ -18,7 +18,7 @@ from echotruth.viewer import arrows, curves, facts, script
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
 from echotruth.viewer.clip import PARTS, Clip
 from echotruth.viewer.graph import Graph
-from echotruth.viewer.panel import ARROWS, Panel
+from echotruth.viewer.panel import ARROWS, PATHS, Panel
 from echotruth.viewer.points import Points
 from echotruth.viewer.tint import component_name, components, tint
 
@@ -38,11 +38,13 @@ class Page:
     repository : Repository
     choice : Choice
         What is shown at first.
+    unknown : str
+        What was asked for and is not there, which is said until something else is chosen.
     document : Document
     """
 
-    def __init__(self, repository: Repository, choice: Choice, document: Document) -> None:
-        self.repository, self.choice, self.document = repository, choice, document
+    def __init__(self, repository: Repository, choice: Choice, unknown: str, document: Document) -> None:
+        self.repository, self.choice, self.unknown, self.document = repository, choice, unknown, document
         self.points = lru_cache(KEPT_CLIPS)(lambda case, view, size: Points(Clip(repository, case, view, size)))
         self._shown: dict[str, Any] = {}
         self._problems: dict[str, None] = {}
@@ -50,7 +52,8 @@ class Page:
         self.times = ColumnDataSource({"time": [0.0], "text": [""]}, name="times")
         self.address = ColumnDataSource({"query": [""]})
         frames = repository.config.loop.frames
-        self.frame = Slider(start=0, end=frames - 1, value=choice.frame, title="Frame", name="frame", width=380)
+        self.frame = Slider(start=0, end=frames - 1, value=choice.frame or 0, title="Frame", name="frame")
+        self.frame.update(sizing_mode="stretch_width", max_width=380)
         self.side = Slider(start=0, end=1e6, value=1, visible=False)
         self.opacity = Slider(start=0, end=1, step=0.05, value=0.6, title="Opacity", width=110)
         ranges = Range1d(-1, 1), Range1d(2, 0)
@@ -62,7 +65,7 @@ class Page:
         document.add_root(self._layout())
         document.title = f"{repository.config.name} - echotruth"
         # Sent as a change, arrays travel as they are; within the page at first they would be text.
-        document.on_event("document_ready", lambda _event: self.show())
+        document.on_event("document_ready", lambda _event: self._begin())
 
     def _widgets(self) -> None:
         """What can be chosen."""
@@ -70,13 +73,13 @@ class Page:
         for name, widget in self.inputs.items():
             widget.name = name
             widget.on_change("value", lambda _attribute, _old, value, name=name: self._choose(name, value))
-        labels = [f"{kind} motion" if kind != "flow" else "flow" for kind in ARROWS]
-        self.arrows = CheckboxButtonGroup(labels=labels, active=[], name="arrows")
+        labels = [f"{kind} paths" if kind in PATHS else kind for kind in ARROWS]
+        self.arrows = CheckboxButtonGroup(labels=labels, active=[0, 1], name="arrows")
         self.arrows.on_change("active", lambda _attribute, _old, _active: self.show())
         self.play = Toggle(label="▶ Play", width=90, name="play", button_type="primary")
         self.rate = Select(title="", value="20", options=[(rate, f"{rate} frames/s") for rate in RATES], width=105)
         self.message = Div(name="message", visible=False, styles={"color": "#a33", "font-weight": "bold"})
-        self.facts = Div(name="facts", width=520)
+        self.facts = Div(name="facts", sizing_mode="stretch_width")
 
     def _scripts(self) -> None:
         """What happens in the browser alone."""
@@ -106,22 +109,25 @@ class Page:
         play = script.callback("play", button=self.play, slider=self.frame, rate=self.rate)
         self.play.js_on_change("active", play)
         self.rate.js_on_change("value", play)
-        address = script.callback("address", address=self.address, slider=self.frame)
+        address = script.callback("address", address=self.address, slider=self.frame, button=self.play)
         self.address.js_on_change("data", address)
+        self.play.js_on_change("active", address)
         self.frame.js_on_change("value_throttled", address)
+        figures, graphs = ([one.figure for one in shown] for shown in (self.panels, self.graphs.values()))
+        self.document.js_on_event("document_ready", script.callback("fit", figures=figures, graphs=graphs))
 
     def _layout(self) -> Any:
         chosen = self.inputs
         apart = {"flex-wrap": "wrap", "gap": "4px"}
         clip = row(*(chosen[name] for name in ("case", "view", "size", "tracker", "other")), styles=apart)
-        switches = column(Div(text="Arrows", margin=(5, 5, 0, 5)), self.arrows)
+        switches = column(Div(text="Motion", margin=(5, 5, 0, 5)), self.arrows)
         drawn = row(chosen["colour"], chosen["component"], self.opacity, switches, styles=apart)
         pictures = row(*(panel.figure for panel in self.panels), styles=apart)
-        player = row(self.play, self.frame, self.rate, styles={"align-items": "center"})
+        player = row(self.play, self.frame, self.rate, sizing_mode="stretch_width", styles={"align-items": "center"})
         plots = row(*(chosen[name] for name in ("curve", "measure", "part")), styles=apart)
-        graphs = row(*(graph.figure for graph in self.graphs.values()), sizing_mode="stretch_width", styles=apart)
-        left = column(pictures, self.pointer, player, self.side, self.facts)
-        right = column(plots, graphs, styles={"flex": "1 1 450px", "min-width": "450px"})
+        graphs = [graph.figure for graph in self.graphs.values()]
+        left = column(pictures, self.pointer, player, self.side, self.facts, styles={"max-width": "100%"})
+        right = column(plots, *graphs, styles={"flex": "1 1 450px", "min-width": "min(450px, 100%)"})
         body = row(left, right, sizing_mode="stretch_width", styles=apart)
         return column(clip, drawn, self.message, body, sizing_mode="stretch_width", styles={"padding": "8px"})
 
@@ -134,8 +140,14 @@ class Page:
             self._say(f"There is no case {value}: choose one from the list.")
             return
         self.choice = replace(self.choice, **{name: chosen})  # type: ignore[arg-type]  # each has its type
+        self.unknown = ""
         self._say("Reading ...")
         self.document.add_next_tick_callback(self.show)
+
+    def _begin(self) -> None:
+        """Show what was asked for, and play it unless a frame was."""
+        self.show()
+        self.play.active = self.choice.frame is None
 
     def show(self) -> None:
         """Show what is chosen; what is shown already stays."""
@@ -153,7 +165,7 @@ class Page:
     def _show(self) -> None:
         choice = self.choice
         points = self.points(choice.case, choice.view, choice.size)
-        clip, self._problems = points.clip, {}
+        clip, self._problems = points.clip, dict.fromkeys([self.unknown] if self.unknown else [])
         self._fit(clip)
         place = (choice.case, choice.view, choice.size)
         self._once("clip", place, lambda: self._show_clip(points))
@@ -208,7 +220,7 @@ class Page:
     def _show_panel(self, number: int, points: Points, tracker: str) -> None:
         """Colours and arrows of one picture."""
         choice, panel = self.choice, self.panels[number]
-        panel.show_beside(tracker != NOTHING or number == 0, alone=choice.other == NOTHING)
+        panel.figure.visible = tracker != NOTHING or number == 0
         if not panel.figure.visible:
             return
         followed = None if tracker in (TRUTH, NOTHING) else tracker
@@ -264,7 +276,8 @@ class Page:
         """Offer the components that the colour has, in the words of the view."""
         known = components(self.choice.colour)
         if self.choice.component not in known:
-            self.choice = replace(self.choice, component=known[min(1, len(known) - 1)] if known else "")
+            along = "LL" if "LL" in known and not clip.is_short_axis else known[1] if known else ""
+            self.choice = replace(self.choice, component=along)
         names = [(name, component_name(name, clip)) for name in known]
         self.inputs["component"].update(options=names, value=self.choice.component, visible=bool(known))
 

@@ -4,16 +4,19 @@ import numpy as np
 from bokeh import models
 from bokeh.events import MouseMove
 from bokeh.plotting import figure
+from matplotlib.ticker import MaxNLocator
 
 from echotruth.report.clip import MOTION
 from echotruth.viewer import script
 from echotruth.viewer.arrows import Arrows
 from echotruth.viewer.tint import Tint
 
-SIDE_ALONE, SIDE_BESIDE = 520, 400
-"""Of a picture on the screen, px: of one alone, and of two beside each other."""
+SIDE = 520
+"""Of a picture on the screen until the window's width is known, px."""
 ARROWS = {"true": MOTION, "tracked": "#35d0ff", "flow": "#7dff6a"}
-"""Kind of arrows to their colour."""
+"""Kind of paths or arrows to their colour."""
+PATHS = ("true", "tracked")
+"""Those of them that are paths."""
 EMPTY = np.zeros(0, np.float32)
 NO_COLOUR = np.zeros((0, 0, 0), np.uint8)
 
@@ -49,7 +52,10 @@ class Panel:
         self.palette = models.ColumnDataSource({"red": EMPTY, "green": EMPTY, "blue": EMPTY})
         self.names = models.ColumnDataSource({"name": [""]})
         self.movements = {
-            kind: models.ColumnDataSource(dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY)) for kind in ARROWS
+            kind: models.ColumnDataSource(
+                dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY), tags=["path"] if kind in PATHS else []
+            )
+            for kind in ARROWS
         }
         ends = ("x0", "y0", "x1", "y1", "head_x", "angle")
         self.arrows = {
@@ -60,9 +66,13 @@ class Panel:
         )
         scale = models.LinearColorMapper(palette=["#ffffff"], low=0, high=1)
         self.bar = models.ColorBar(
-            color_mapper=scale, width=12, visible=False, title_standoff=8, major_label_policy=models.AllLabels()
+            color_mapper=scale,
+            ticker=models.FixedTicker(),  # of which a bar sees new ticks, as it does not see another ticker
+            width=12,
+            visible=False,
+            title_standoff=8,
+            major_label_policy=models.AllLabels(),
         )
-        self._ticks: list[int] = []
         self.figure = _figure(ranges, name)
         # Rows run downwards as depth does: the first is at depth 0, where the axis begins.
         self._image = self.figure.image_rgba("image", x=-1, y=0, dw=2, dh=2, source=self.picture, origin="bottom_left")
@@ -75,9 +85,11 @@ class Panel:
 
     def _draw(self, kind: str) -> list[models.GlyphRenderer]:
         source, colour = self.arrows[kind], ARROWS[kind]
-        line = self.figure.segment("x0", "y0", "x1", "y1", source=source, line_color=colour, line_width=1.6)
+        marker, size = ("circle", 5) if kind in PATHS else ("triangle", 6)
+        width = 3 if kind == "true" else 1.5  # so that it is seen below what is drawn over it
+        line = self.figure.segment("x0", "y0", "x1", "y1", source=source, line_color=colour, line_width=width)
         head = self.figure.scatter(
-            "head_x", "y1", angle="angle", marker="triangle", size=6, source=source, color=colour, line_color=None
+            "head_x", "y1", angle="angle", marker=marker, size=size, source=source, color=colour, line_color=None
         )
         for renderer in (line, head):
             renderer.visible = False
@@ -96,11 +108,6 @@ class Panel:
         self.picture.data = {"image": [np.zeros((pixels, pixels), np.uint32)]}
         self._image.glyph.update(x=-side / 2, y=0, dw=side, dh=side)
 
-    def show_beside(self, visible: bool, alone: bool) -> None:
-        """Show the picture or hide it, smaller if there are two."""
-        side = SIDE_ALONE if alone else SIDE_BESIDE
-        self.figure.update(visible=visible, frame_width=side, frame_height=side)
-
     def clear(self) -> None:
         """Show neither colours nor arrows."""
         self.tint(None)
@@ -117,12 +124,8 @@ class Panel:
         self.palette.data = dict(zip(("red", "green", "blue"), rgb.astype(np.float32).T.copy(), strict=True))
         self.names.data = {"name": ["", *tint.names.values()]}
         self.bar.color_mapper.update(palette=tint.palette, low=tint.low, high=tint.high)
-        if list(tint.names) != self._ticks:  # other models make Bokeh look through the whole page
-            self._ticks = list(tint.names)
-            self.bar.ticker = models.FixedTicker(ticks=self._ticks) if tint.names else models.BasicTicker()
-        # Of a name, the bar has the number if it begins with one; the pointer has all of it.
-        short = {number: name.split(" ")[0] if name[0].isdigit() else name for number, name in tint.names.items()}
-        self.bar.update(title=tint.title, visible=True, major_label_overrides=short)
+        self.bar.ticker.ticks = list(tint.names) or MaxNLocator(6).tick_values(tint.low, tint.high)
+        self.bar.update(title=tint.title, visible=True, major_label_overrides=tint.names)
         self.colour.data = {"index": [tint.index]}
 
     def move(self, kind: str, arrows: Arrows | None) -> None:
@@ -142,12 +145,12 @@ def _figure(ranges: tuple[models.Range1d, models.Range1d], name: str) -> figure:
     drawn = figure(
         x_range=lateral,
         y_range=axial,
-        frame_width=SIDE_ALONE,
-        frame_height=SIDE_ALONE,
+        frame_width=SIDE,
+        frame_height=SIDE,
+        styles={"flex": "none"},  # it overflows rather than be squeezed, until fit.js knows the room
         tools="pan,wheel_zoom,box_zoom,reset,save",
         active_drag=None,
         toolbar_location="above",
-        min_border_left=60,
         background_fill_color="black",
         name=f"figure_{name}",
         x_axis_label="lateral (mm)",

@@ -53,7 +53,7 @@ def serve(repository: str | Path, port: int = 0) -> BaseServer:
         query = context.request.arguments if context is not None and context.request is not None else {}
         try:
             now = opened(repository)  # a run may be going on
-            Page(now, asked(now, texts(query)), document)
+            Page(now, *asked(now, texts(query)), document)
         except Exception as error:  # the folder may be gone, and what is damaged fails in many ways
             said = str(error).removeprefix(f"{repository}: ")
             document.add_root(Div(text=escape(f"{repository} cannot be shown: {said}"), name="message"))
