@@ -42,7 +42,7 @@ class Ours:
 
     def mesh(self, elements: list[int] | None = None) -> dict[str, int]:
         """Mesh the paper's ventricle, or one with other numbers of elements around, along and through the wall."""
-        geometry = Geometry(**_elements(elements))
+        geometry = PAPERS.geometry.model_copy(update=_elements(elements))
         config = PAPERS.model_copy(update={"geometry": geometry, "mechanics": ELASTIC})
         self._use(config)
         return {"cells": len(self._wall.mesh.cells)}

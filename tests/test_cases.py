@@ -148,3 +148,11 @@ def test_random_numbers_differ_between_views_and_repeat_in_any_order():
 def test_a_sweep_that_cannot_be_run_is_refused(sweep, sentence):
     with pytest.raises(ConfigError, match=sentence):
         expand(Config(cases=sweep))
+
+
+def test_a_loop_is_checked_with_the_size_of_its_heart():
+    """The end-systolic volume that is not given is in proportion to the cavity."""
+    assert len(et.expand(et.configure(geometry={"scale": 0.7}, loop={"edv_uL": 15.0}))) == 1
+    large = et.configure(geometry={"scale": 1.4}, loop={"edv_uL": 40.0})
+    with pytest.raises(et.ConfigError, match=r"loop: .*end-systolic volume is 49\.\d+ uL and the end-diastolic 40 uL"):
+        et.expand(large)

@@ -83,8 +83,7 @@ def check_files(hearts: list[tuple[Combination, Case]], source: str) -> None:
     ConfigError
         With the row that names the file, if it is in a table.
     """
-    for loop, place, _ in _distinct(hearts, "loop", source):
-        _check_loop(loop, place)
+    _check_loops(hearts, source)
     known: set[str | None] = {None}
     for motion, place, _ in _distinct(hearts, "motion", source):
         if motion.kind == "file" and motion.file.path not in known:
@@ -152,16 +151,26 @@ def _distinct(hearts: list[tuple[Combination, Case]], name: str, source: str) ->
     return list(found.values())
 
 
-def _check_loop(loop: Any, place: str) -> None:
+def _check_loops(hearts: list[tuple[Combination, Case]], source: str) -> None:
+    """Check each loop once for each size of heart that beats through it."""
     from echotruth.loop.calibration import closed_valves
-    from echotruth.loop.cycle import LoopError, check_loop, read_loop
+    from echotruth.loop.cycle import LoopError, check_loop, read_loop, size
 
-    try:
-        check_loop(loop)
-        if loop.kind == "circulation":
-            closed_valves(read_loop(loop))
-    except LoopError as error:
-        raise ConfigError(f"{place}: loop: {error}") from None
+    known: set[tuple[str, float]] = set()
+    for heart, case in hearts:
+        loop, factor = case.config.loop, size(case.config)
+        found = loop.model_dump_json(), factor
+        if found in known:
+            continue
+        known.add(found)
+        try:
+            check_loop(loop, factor)
+            if loop.kind == "circulation":
+                closed_valves(read_loop(loop, factor))
+        except LoopError as error:
+            is_swept = heart.origin and any(key.startswith(("loop.", "geometry.")) for key in heart.parameters)
+            place = f"{source}: {heart.origin}" if is_swept else source
+            raise ConfigError(f"{place}: loop: {error}") from None
 
 
 def _check_series(path: str | None, place: str) -> None:

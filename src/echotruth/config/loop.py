@@ -70,7 +70,7 @@ class Loop(Section):
     which is that of the default ellipsoid of its species, has it in proportion to the unloaded cavity of this one. In
     a circulation it is that of the heart before its `dilation`."""
     esv_uL: Volume | None = None
-    """End-systolic volume, likewise."""
+    """End-systolic volume, likewise: where one of the two is given, the other keeps to the heart's size."""
     edp_mmHg: Pressure | None = None
     """End-diastolic pressure; pressures up to it are scaled, those above mapped linearly. Default: that of the file."""
     esp_mmHg: Pressure | None = None

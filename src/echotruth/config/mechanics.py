@@ -40,7 +40,8 @@ class Active(Section):
     """Besides beta, growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart, as long
     after activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land
     et al. (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum
-    again, as in patients; the mouse's 16 is chosen for that, and is what that model has at low activation."""
+    again, as in patients; the mouse's 16 is chosen for that, and is near what that model has at low activation (both
+    recalled)."""
 
 
 class Pericardium(Section):

@@ -6,7 +6,7 @@ import numpy as np
 
 from echotruth.cases import Case
 from echotruth.imaging.labels import unpack
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.repository.reader import Repository
 from echotruth.seeds import generator
 from echotruth.tracking.point_grid import grid_pixels, grid_points
@@ -140,7 +140,7 @@ def make_clip(case: Case, view: str, frames: np.ndarray, labels: np.ndarray, ins
         inside=inside,
         points=grid_points(config, size)[inside],
         spacing=config.bmode.si().field_of_view / size,
-        frame_time=read_loop(config.loop).time,
+        frame_time=frame_times(config.loop),
         seed=tracker_seed(case, view),
         frame_step=config.tracking.frame_step,
         is_closed=config.views[view].motion.is_closed,

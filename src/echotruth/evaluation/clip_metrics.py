@@ -23,7 +23,7 @@ from echotruth.evaluation.scoring import metrics
 from echotruth.evaluation.segment_strain import Row
 from echotruth.imaging.labels import unpack
 from echotruth.imaging.tracks import visible
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.repository import estimates
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.reader import Repository
@@ -147,7 +147,7 @@ def clip_truth(repository: Repository, case: str, view: str) -> ClipTruth:
         unit=unit,
         tissue=segment_strain.Tissue(**named, layers=config.fibres.layers),
         plane=plane,
-        time=read_loop(config.loop).time,
+        time=frame_times(config.loop),
         es=int(repository.read("mechanics/es_frame", case)),
         curves={"segment_strain": segments, "line_strain": stored["true_line_strain"].astype(float)},
     )

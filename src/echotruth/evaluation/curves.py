@@ -6,7 +6,7 @@ import xarray as xr
 from echotruth.config import Config
 from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.courses import peak, rate, systolic_rate
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.repository import estimates, schema
 from echotruth.repository.choice import image_size, require_known
 from echotruth.repository.reader import Repository
@@ -37,7 +37,7 @@ def strain_curves(
     values |= estimates.true(repository, case, view, *(f"true_{name}" for name in NAMES))
     for name in ("true_region_strain", "true_segment_strain"):
         values[name] = values[name][REFERENCES.index(reference)]
-    es, time = int(repository.read("mechanics/es_frame", case)), read_loop(config.loop).time
+    es, time = int(repository.read("mechanics/es_frame", case)), frame_times(config.loop)
     return _dataset(values, time, config).assign_attrs(
         case=case,
         view=view,

@@ -24,7 +24,7 @@ from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.heart import Heart
 from echotruth.imaging.truth import cavity_centroid, material_truth
 from echotruth.imaging.view import Plane
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.repository import rounding, schema
 from echotruth.repository.reader import Repository
 from echotruth.repository.rounding import length_quantum
@@ -157,7 +157,7 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config
     strain = [motion[f"{name}_strain"][:, inside] for name in REFERENCES[:2]]
     strain.append(operator.strain(displacement))
     stored = _single(np.stack(strain), rounding.STRAIN)
-    lines, time = contours(heart, plane), read_loop(config.loop).time[: len(heart.displacement)]
+    lines, time = contours(heart, plane), frame_times(config.loop)[: len(heart.displacement)]
     return Truth(inside, wall, operator, displacement, through_plane, stored, heart.es, lines, time, quantum)
 
 

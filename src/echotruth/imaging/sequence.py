@@ -15,7 +15,7 @@ from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.recorder import RfRecorder
 from echotruth.imaging.view import Plane
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 
 logger = logging.getLogger("echotruth")
 
@@ -41,7 +41,7 @@ class Sequence:
     """
 
     def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random, time: Floats | None = None) -> None:
-        self._scene = Scene(config, heart, plane, random, read_loop(config.loop).time if time is None else time)
+        self._scene = Scene(config, heart, plane, random, frame_times(config.loop) if time is None else time)
         self.scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
 
     def scatterers(self) -> Arrays:

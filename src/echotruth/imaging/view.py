@@ -8,7 +8,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config, Loop, Rf, View
 from echotruth.config.imaging import Breathing, Excursion, ViewMotion
 from echotruth.heart import SHORT_AXIS, Heart, RigidMotion
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times, period
 
 BEATS_PER_BREATH = 4.5
 """Heart rate 241 M^-0.25 over respiratory rate 53.5 M^-0.26, M the mass of a mammal (Stahl 1967)."""
@@ -142,11 +142,11 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop) -> Heart:
     """
     if motion == ViewMotion():
         return heart
-    cycle, si = read_loop(loop), motion.si()
-    time = cycle.time[: len(heart.displacement)]
-    angle = si.rocking * raised_cosine(2 * np.pi * time / cycle.period)
-    shift = np.outer(time / cycle.period, _vector(motion.drift))
-    shift += np.outer(inspiration(motion.breathing, time, cycle.period), _vector(motion.breathing))
+    beat, si = period(loop), motion.si()
+    time = frame_times(loop)[: len(heart.displacement)]
+    angle = si.rocking * raised_cosine(2 * np.pi * time / beat)
+    shift = np.outer(time / beat, _vector(motion.drift))
+    shift += np.outer(inspiration(motion.breathing, time, beat), _vector(motion.breathing))
     rotation = [plane.axes.T @ rotation_in_image(each) @ plane.axes for each in angle]
     rigid = RigidMotion(plane.origin, np.stack(rotation), shift @ plane.axes)
     rigid.rotation[angle == 0] = np.eye(3)  # without rounding

@@ -21,7 +21,7 @@ from echotruth.inference.imaged_wall import ImagedWall
 from echotruth.inference.laplace import Prediction
 from echotruth.inference.observation import ObservationError
 from echotruth.inference.parameters import Parameter, slopes
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle, period, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.notebook.sensitivities import sensitivities
 from echotruth.section import UNITS
@@ -90,10 +90,10 @@ def _measured(observed: xr.Dataset, given: Config, folder: Path) -> Loop:
     pressure, volume = (observed[curve].values.astype(float) for curve in ("pressure", "volume"))
     if not (np.isfinite(pressure).all() and np.isfinite(volume).all()):
         raise ObservationError(f"{name}: a pressure or volume is not finite: give all frames of a cycle")
-    path, period = folder / "loop.csv", read_loop(given.loop).period
+    path, beat = folder / "loop.csv", period(given.loop)
     loop = Loop(file=str(path), frames=len(pressure))
     try:
-        _write_loop(path, period, pressure, volume)
+        _write_loop(path, beat, pressure, volume)
         cycle = read_loop(loop)
         end = cycle.systole[-1]
     except LoopError as error:
@@ -147,7 +147,7 @@ class HeartModel:
     aha: Sequence[int]
 
     def __post_init__(self) -> None:
-        self._frames = read_loop(self.config.loop).systole
+        self._frames = heart_cycle(self.config).systole
         self._walls: dict[str, ImagedWall] = {}
 
     def at(self, scaled: Floats) -> Config:

@@ -100,31 +100,23 @@ class Cycle:
 
 
 def heart_cycle(config: Config) -> Cycle:
-    """The cycle of the heart of a configuration.
+    """The cycle of the heart of a configuration: as of :func:`read_loop`, by its :func:`size`."""
+    return read_loop(config.loop, size(config))
+
+
+def size(config: Config) -> float:
+    """Factor on the volumes of the loop's file, where the section gives none.
 
     A shipped loop is that of the ellipsoid of its species. In another ellipsoid its volumes are in proportion to that
     of the cavity, so that a heart that is larger fills by as much and ejects the same fraction. With `loop.kind:
     circulation` it is the loop of the heart before it was dilated.
-
-    Parameters
-    ----------
-    config : Config
-
-    Returns
-    -------
-    Cycle
-
-    Raises
-    ------
-    LoopError
-        As :func:`read_loop`.
     """
     geometry, species = config.geometry, SPECIES_OF.get(config.loop.file)
     if species is None or geometry.file:
-        return read_loop(config.loop)
+        return 1.0
     if config.loop.kind == "circulation":
         geometry = geometry.model_copy(update={"dilation": 1.0})
-    return read_loop(config.loop, geometry.cavity_uL() / Geometry(preset=species).cavity_uL())
+    return geometry.cavity_uL() / Geometry(preset=species).cavity_uL()
 
 
 def read_loop(loop: Loop, size: float = 1.0) -> Cycle:
@@ -158,7 +150,7 @@ def read_loop(loop: Loop, size: float = 1.0) -> Cycle:
     return Cycle(str(recording.path), loop.prescribed, period, phase * period, **sampled)
 
 
-def check_loop(loop: Loop) -> None:
+def check_loop(loop: Loop, size: float = 1.0) -> None:
     """Check all that :func:`read_loop` does, in less time.
 
     Raises
@@ -166,7 +158,7 @@ def check_loop(loop: Loop) -> None:
     LoopError
         If the file cannot be read or holds no valid cycle.
     """
-    recorded_curves(loop)
+    recorded_curves(loop, size)
 
 
 def frame_times(loop: Loop) -> Floats:
@@ -177,7 +169,12 @@ def frame_times(loop: Loop) -> Floats:
     LoopError
         If the file cannot be read or its curves are not valid.
     """
-    return np.arange(loop.frames) / loop.frames * _period(_read_recording(loop), loop)
+    return np.arange(loop.frames) / loop.frames * period(loop)
+
+
+def period(loop: Loop) -> float:
+    """Period of a cycle, s; raises as :func:`frame_times`."""
+    return _period(_read_recording(loop), loop)
 
 
 def recorded_curves(loop: Loop, size: float = 1.0) -> dict[str, Floats | None]:

@@ -22,7 +22,7 @@ from echotruth.mechanics.pathology import BORDER, INFARCT, PathologyError, healt
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
 from echotruth.mechanics.solver.circulation import guessed, steady_beat
-from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, overstrained, solve, solved_cycle
+from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
 from echotruth.mechanics.solver.element import fibre_stretch
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.unloaded import unload
@@ -125,7 +125,8 @@ def check_frames(config: Config, frames: Sequence[int]) -> None:
 
 def _untried(config: Config) -> str:
     """Keys outside of the ranges whose hearts are usable, and these, in a clause; empty if there are none."""
-    ranges = {key: drawn["uniform"] for key, drawn in HEARTS.items() if "uniform" in drawn}
+    acting = () if config.loop.kind == "circulation" else ("loop.circulation.",)
+    ranges = {key: one["uniform"] for key, one in HEARTS.items() if "uniform" in one and not key.startswith(acting)}
     values = {key: value_of(config, key) for key in ranges}
     found = [f"{key} = {values[key]:g} ({a:g} to {b:g})" for key, (a, b) in ranges.items() if not a <= values[key] <= b]
     return f"; beyond what was tried (cases.draw.preset = hearts): {', '.join(found)}" if found else ""
@@ -158,9 +159,6 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
         guess = guessed(measured, edv, equations.volume(equations.unloaded_state(0.0)), strength)
         frames = steady_beat(stepper, circulation, guess, activation, settings.beats_max)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
-    except Diverged as failure:
-        said = overstrained(cycle, measured.active_tension, equations.law.cross_fibre)
-        raise Diverged(said or str(failure)) from None
     finally:
         equations.close()
 

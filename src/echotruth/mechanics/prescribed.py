@@ -7,7 +7,7 @@ from echotruth.config import Config
 from echotruth.config.motion import Affine, Rigid, TimeCourse, TubeMotion
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.heart import SHORT_AXIS
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.loop.phases import FILLING
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.geometry.lattice import Tube, tube_dimensions
@@ -72,7 +72,7 @@ def unsolved(config: Config, displacement: Floats, n_cells: int, es: int, phase:
         "arterial_pressure",
     )
     return {
-        "time": read_loop(config.loop).time,
+        "time": frame_times(config.loop),
         **dict.fromkeys(undefined, np.full(frames, np.nan)),
         "cell_tension": np.full((frames, n_cells), np.nan, np.float32),
         "displacement": displacement,

@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from echotruth.heart import Heart
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
 from echotruth.notebook.arguments import check_heart
 from echotruth.repository import schema
@@ -49,5 +49,5 @@ def kinematics(heart: Heart) -> xr.Dataset:
         for array in schema.DERIVED
     }
     labels = {name: list(schema.LABELS[name]) for name in ("strain_component", "fibre_component")}
-    times = ("frame", read_loop(heart.config.loop).time, {"units": "s"})
+    times = ("frame", frame_times(heart.config.loop), {"units": "s"})
     return xr.Dataset(variables, {**labels, "frame": np.arange(len(heart.displacement)), "time": times})

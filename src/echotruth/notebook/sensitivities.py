@@ -10,7 +10,7 @@ from echotruth.config import Config
 from echotruth.config.building import Source, configure
 from echotruth.config.loading import ConfigError
 from echotruth.heart import Heart
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle
 from echotruth.mechanics.sensitivities import sensitivities as taken
 from echotruth.repository import schema
 
@@ -82,7 +82,7 @@ def sensitivities(
     if not names:
         raise ConfigError("parameters: name one key or more, such as fibres.endo_deg")
     changed = {name: _changed(settings, name) for name in names}
-    chosen = read_loop(settings.loop).systole if frames is None else list(frames)
+    chosen = heart_cycle(settings).systole if frames is None else list(frames)
     arrays, found = taken(settings, changed, chosen)
     variables: dict[str, Any] = {
         name: (

@@ -25,7 +25,7 @@ from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import before_probe
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle
 from echotruth.mechanics.beat import beat as mechanics_beat
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violation
@@ -109,7 +109,7 @@ def systole(config: Source = None) -> list[int]:
     >>> frames[0], frames[-1]
     (0, 21)
     """
-    return read_loop(configure(config).loop).systole
+    return heart_cycle(configure(config)).systole
 
 
 def image(

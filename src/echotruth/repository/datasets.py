@@ -14,7 +14,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.truth import wall_mask
 from echotruth.imaging.view import Plane, moved
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import frame_times
 from echotruth.repository import rounding, schema
 from echotruth.repository.derived import derived
 from echotruth.tracking.point_grid import grid_positions
@@ -81,7 +81,7 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
     data, labels = xr.Dataset(found), schema.LABELS | coordinates
     data = data.assign_coords({name: (name, np.asarray(labels[name])) for name in data.dims if name in labels})
     if "frame" in data.dims:
-        data = data.assign_coords(time=("frame", read_loop(case.config.loop).time, {"units": "s"}))
+        data = data.assign_coords(time=("frame", frame_times(case.config.loop), {"units": "s"}))
     return data
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.config import Config, Geometry, Loop, shipped
-from echotruth.loop.cycle import frame_times, recorded_curves
+from echotruth.loop.cycle import frame_times, recorded_curves, size
 from echotruth.section import Section
 
 PACKAGE = Path(__file__).parents[1]
@@ -150,7 +150,7 @@ def _content(config: Config) -> Settings:
     """What the files that a heart names hold."""
     found: list[Any] = [_mesh_hash(config.geometry)]
     if config.motion.kind == "beat":
-        found.append(_curves(config.loop))
+        found.append(_curves(config.loop, size(config)))
     if config.motion.kind == "file":
         found.append(_series_hash(str(config.motion.file.path)))
     return tuple(found)
@@ -215,9 +215,10 @@ def _file_hash(path: Path, date: int) -> str:
 
 
 @lru_cache(maxsize=1000)
-def _curves(loop: Loop) -> dict[str, Any]:
+def _curves(loop: Loop, of_heart: float) -> dict[str, Any]:
     """Curves that are prescribed, read once for all hearts that share them."""
-    return {name: None if values is None else values.tolist() for name, values in recorded_curves(loop).items()}
+    found = recorded_curves(loop, of_heart)
+    return {name: None if values is None else values.tolist() for name, values in found.items()}
 
 
 @lru_cache(maxsize=1000)

@@ -16,7 +16,7 @@ from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpola
 from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
 from echotruth.imaging.medium.random_process import RandomProcess, brownian, diffusion_std
 from echotruth.imaging.medium.wall import draw_in_cells, max_jacobian
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import period
 from echotruth.mechanics.geometry.boundary import triangle_edges
 
 MAX_DIFFUSION = 5
@@ -101,7 +101,7 @@ class Blood(Body):
 
     def nearest(self, frame: int) -> Floats:
         position = self.positions(frame)
-        offset = MAX_DIFFUSION * diffusion_std(read_loop(self.scene.config.loop).period, *self._decorrelation)
+        offset = MAX_DIFFUSION * diffusion_std(period(self.scene.config.loop), *self._decorrelation)
         return np.column_stack([position[:, :2], np.maximum(np.abs(position[:, 2]) - offset, 0)])
 
     def __call__(self, frame: int) -> Echoes:

@@ -204,8 +204,8 @@ def overstrained(cycle: Cycle, tension: Floats, cross_fibre: Floats) -> str:
     said = f"The loop asks for a T_Ca of {tension.max() / 1e3:.3g} kPa, and muscle bears {OVERSTRAINED / 1e3:g}"
     most = MOST_NORMAL_SHARE * cross_fibre[0]
     if cross_fibre[1] > most:
-        return f"{said}: give mechanics.active.normal_share of {most:.2g} or less, well below sheet_share."
-    borne = cycle.volume[: np.argmax(tension >= OVERSTRAINED)].min() / cycle.edv
+        return f"{said}: give mechanics.active.normal_share of {most:.2g} or less, or raise sheet_share."
+    borne = cycle.volume[: max(1, int(np.argmax(tension >= OVERSTRAINED)))].min() / cycle.edv
     if borne > 0.9:
         return f"{said}, before it has ejected: lower loop.esp_mmHg, or thicken the wall."
     return f"{said}: give loop.esv_uL of {borne:.2f} times the end-diastolic volume or more."
