@@ -7,6 +7,7 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
+import echotruth as et
 from echotruth.cases import case_id, expand
 from echotruth.config import Cases, Config
 from echotruth.config.loading import ConfigError, override
@@ -154,5 +155,5 @@ def test_a_loop_is_checked_with_the_size_of_its_heart():
     """The end-systolic volume that is not given is in proportion to the cavity."""
     assert len(et.expand(et.configure(geometry={"scale": 0.7}, loop={"edv_uL": 15.0}))) == 1
     large = et.configure(geometry={"scale": 1.4}, loop={"edv_uL": 40.0})
-    with pytest.raises(et.ConfigError, match=r"loop: .*end-systolic volume is 49\.\d+ uL and the end-diastolic 40 uL"):
+    with pytest.raises(ConfigError, match=r"loop: .*end-systolic volume is 49\.\d+ uL and the end-diastolic 40 uL"):
         et.expand(large)
