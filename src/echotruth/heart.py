@@ -118,7 +118,3 @@ class Heart:
     def positions(self, frame: int) -> Floats:
         """Nodes in a frame, (n_nodes, 3), m."""
         return self.nodes + self.displacement[frame]
-
-    def without_rigid(self, frame: int, positions: Floats) -> Floats:
-        """Where what is at positions (n, 3), m, in a frame would be without the rigid motion; (n, 3), m."""
-        return positions if self.rigid is None else self.rigid.undone(frame, positions)

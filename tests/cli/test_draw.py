@@ -16,6 +16,16 @@ def clip(tmp_path):
     return tmp_path / "clip.npy"
 
 
+def square(part, half):
+    """Rows of a border, a square about a point."""
+    corners = ((-half, -half), (half, -half), (half, half), (-half, half))
+    return "".join(f"{part},{50 + x},{45 + y}\n" for x, y in corners)
+
+
+WALL = "# view: mid\n# part: cycle 1 4, crop 10 0 110 90\npart,lateral_px,axial_px\n"
+WALL += square("endocardium", 15) + square("epicardium", 25)
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
@@ -69,6 +79,26 @@ def test_sector_that_is_shown_is_told(tmp_path):
         process.stdout.readline()
         process.terminate()
         assert process.stderr.read().endswith("clip.npy: shows what moves in it: --crop 29 19 101 71\n")
+
+
+@pytest.mark.parametrize(("options", "shown"), [([], (1, 4)), (["--cycle", "0", "4"], (0, 4))])
+def test_cycle_and_crop_of_the_wall_are_the_default(call, clip, monkeypatch, options, shown):
+    from echotruth.echo import drawing
+
+    clip.with_name("clip.wall.csv").write_text(WALL)
+    clips = []
+    monkeypatch.setattr(drawing.DrawingServer, "run", lambda self, ready: clips.append(self.drawing))
+    call("draw", "clip.npy", "--spacing-mm", "0.3", "--frame-time-ms", "20", "--no-browser", *options)
+    assert clips[0].clip.attrs["part"] == f"cycle {shown[0]} {shown[1]}, crop 10 0 110 90"
+    assert clips[0].description()["cycle"] == (1 - shown[0], 4 - shown[0])
+
+
+def test_cycle_that_does_not_hold_that_of_the_wall_is_refused(call, clip):
+    clip.with_name("clip.wall.csv").write_text(WALL)
+    options = ["--spacing-mm", "0.3", "--frame-time-ms", "20", "--cycle", "0", "3", "--no-browser"]
+    status, output, errors = call("draw", "clip.npy", *options)
+    assert (status, output, errors.count("\n")) == (2, "", 1)
+    assert "clip.wall.csv: was drawn in frames 1 to 4, and the clip shows 0 to 3: give a cycle that" in errors
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -134,6 +134,15 @@ def test_cycle_that_is_chosen_is_saved_and_there_when_the_page_is_opened_again(s
     assert (status, said["error"]) == (400, "cycle: frames 2 to 4 are none of 3 or more frames of the clip")
 
 
+def test_wall_of_a_cycle_that_is_not_in_the_clip_is_refused_and_left_as_it_is(clip, tmp_path):
+    wall = et.Wall(circle(RADII[0]), circle(RADII[1]), "mid", None, "cycle 2 6, crop 0 0 120 90")
+    write_wall(tmp_path / "a.csv", wall)
+    sentence = r"a.csv: was drawn in frames 2 to 6, and the clip shows 0 to 4: give a cycle that holds them"
+    with pytest.raises(et.EchoError, match=sentence):
+        Drawing(clip, tmp_path / "a.csv")
+    assert et.read_wall(tmp_path / "a.csv").part == wall.part
+
+
 def test_points_that_were_clicked_are_there_when_the_page_is_opened_again(server):
     save(server, ring(endocardium_clicked=[0, 50, 100, 150], epicardium_clicked=[0, -1, 10**9]))
     said = ask(server, "GET", "/clip.json")[1]

@@ -159,6 +159,20 @@ def test_wall_drawn_in_another_part_of_the_recording_is_refused(ring, tmp_path):
         et.speckle_tracking(clip, drawn, "dis")
 
 
+def test_wall_whose_part_cannot_be_read_is_refused(ring, tmp_path, monkeypatch, capsys):
+    """Files of an earlier version say where the part begins, and not where it ends."""
+    np.save(tmp_path / "clip.npy", ring.frames)
+    drawn = replace(ring.wall(), part="from frame 0, column 120 and row 40 on")
+    write_wall(tmp_path / "clip.wall.csv", drawn)
+    sentence = 'the part "from frame 0, column 120 and row 40 on" in which the wall was drawn cannot be read: write'
+    with pytest.raises(et.EchoError, match=f"^{sentence} .* --cycle and --crop$"):
+        et.speckle_tracking(clip_of(ring), drawn, "dis")
+    given = tmp_path / "clip.npy", "--spacing-mm", "0.04", "--frame-time-ms", "10", "-o", tmp_path / "out"
+    status, told = run(monkeypatch, capsys, *given)
+    assert status == 2 and told.err.count("\n") == 1
+    assert told.err.startswith(f"echotruth: {tmp_path / 'clip.wall.csv'}: {sentence}")
+
+
 def test_command_writes_page_curves_and_table_of_a_batch(ring, tmp_path, monkeypatch, capsys):
     wall = ring.wall()
     for name in ("one", "two", "three"):

@@ -1,5 +1,7 @@
 """Blood: it fills the cavity, evenly, in every frame, and never enters the wall."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scenes import scene
@@ -80,6 +82,18 @@ def test_blood_that_diffuses_far_stays_out_of_the_wall_and_below_the_base(blood,
     assert (np.abs(position - carried).max() > 1e-4) == (frame == 1)
     assert (locate(nodes, twisting_heart.cells, position).cell < 0).all()
     assert position[:, 2].max() <= nodes[:, 2].max() + 1e-12
+
+
+@pytest.mark.parametrize("tilt", [-20.0, 20.0])
+def test_blood_that_diffuses_far_stays_below_the_plane_of_a_rim_that_tilts(diffusing, twisting_heart, tilt):
+    cos, sin = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
+    turn, now = np.array([[1, 0, 0], [0, cos, -sin], [0, sin, cos]]), twisting_heart.positions(1)
+    displacement = np.stack([twisting_heart.displacement[0], now @ turn.T - twisting_heart.nodes])
+    tilted = replace(diffusing.scene, heart=replace(twisting_heart, displacement=displacement))
+    position = in_heart(replace(diffusing, scene=tilted), 1) @ turn
+    # Turned back, the base is level.
+    assert position[:, 2].max() <= now[:, 2].max() + 1e-12
+    assert (position[:, 2] > now[:, 2].max() - 0.05e-3).any()
 
 
 def test_its_power_in_a_volume_is_that_of_muscle_times_the_level(blood, twisting_heart):

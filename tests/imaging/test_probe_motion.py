@@ -141,6 +141,14 @@ def test_what_is_outside_the_heart_and_the_column_above_its_lid_stays_so_as_the_
     assert np.abs(heart.rigid.undone(4, after) - before).max() < 1e-15
 
 
+def test_the_column_above_the_lid_tilts_with_a_base_that_tilts(still):
+    """As that of a heart that `mechanics.hold: apex` turns without the probe."""
+    heart, plane = before_probe(still, config(FRAMES, MOTION), "long")
+    before = plane.to_heart(np.random.default_rng(0).uniform([-4e-3, 1e-3, -2e-3], [4e-3, 12e-3, 2e-3], (4000, 3)))
+    after, itself = before + heart.rigid.displacement(4, before), replace(heart, rigid=None)
+    assert np.array_equal(outside_heart(itself, 4, after), outside_heart(still, 0, before))
+
+
 def test_no_motion_leaves_the_heart_as_it_is(still):
     assert before_probe(still, config(FRAMES, {}), "mid")[0] is still
 

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 
 from echotruth.aha import segment
-from echotruth.config import Bmode, Config, Probe, Rf, View
+from echotruth.config import Bmode, Config, Geometry, Probe, Rf, View
 from echotruth.config.imaging import Offset, ViewMotion
 from echotruth.config.loading import ConfigError, validate
 from echotruth.echo.wall import LEFT_AND_RIGHT, SEPTAL_AND_FREE
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip, pixel_centres
 from echotruth.imaging.view import imaging_plane
+from echotruth.mechanics.geometry.ellipsoid import semi_axes
 
 ENDO = np.array([[0, 0, -6e-3], [1e-3, 0, 0], [-1e-3, 0, -1e-3]])
 
@@ -147,3 +148,24 @@ def test_drift_and_breathing_keep_the_cycle_from_closing(motion, is_closed):
 def test_probe_that_would_come_into_the_heart_is_refused(view):
     with pytest.raises(ConfigError, match=r"views\.mid\.offset\.axial_mm .*brings the array into the heart"):
         validate({"views": {"mid": view}}, "test")
+
+
+@pytest.mark.parametrize("shape", [{}, {"scale": 1.1, "dilation": 1.2, "elongation": 1.3, "hypertrophy": 1.4}])
+@pytest.mark.parametrize(
+    ("angle", "slack"), [(0.0, 1e-3), (30.0, 0.2), (60.0, 0.4), (90.0, 1e-3), (120.0, 0.4), (-150.0, 0.5), (180.0, 0.5)]
+)
+def test_array_of_a_long_axis_may_come_as_near_as_the_heart_reaches_and_no_nearer(shape, angle, slack):
+    (_, length, base), (radius, depth, _) = 1e3 * np.array(semi_axes(Geometry(**shape)))
+    along = np.linspace(-depth, base, 20001)
+    across, turn = radius * np.sqrt(1 - (along / depth) ** 2), np.radians(angle)
+    # From the middle of the cavity's axis to the array, which unless it is turned stands before the apex.
+    nearest = 13 - np.max(((base - length) / 2 - along) * np.cos(turn) + across * abs(np.sin(turn)))
+
+    def given(axial):
+        view = {"plane": "long_axis", "angle_deg": angle, "offset": {"axial_mm": axial}}
+        field = {"rf": {"focus_mm": 13.0}, "bmode": {"field_of_view_mm": 24.0}}
+        return validate(field | {"geometry": shape, "views": {"long": view}}, "test")
+
+    with pytest.raises(ConfigError, match=r"views\.long\.offset\.axial_mm .*brings the array into the heart"):
+        given(nearest + 1e-3)
+    given(nearest - slack)

@@ -1,9 +1,12 @@
 """What a tracker saw, read from a repository, and the same seen of a heart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import echotruth as et
+from echotruth.config.imaging import ViewMotion
 from echotruth.evaluation.segment_strain import COMPONENTS
 from echotruth.inference import observation, tracker_errors
 from echotruth.inference.imaged_wall import ImagedWall
@@ -85,6 +88,20 @@ def test_segment_that_the_tracker_lost_is_left_out(errors, monkeypatch):
     monkeypatch.setattr(Repository, "tracks", nothing)
     with pytest.raises(ObservationError, match="saw no segment"):
         observe(et.sample(), "dis", "healthy", errors=errors)
+
+
+@pytest.mark.parametrize(("view", "is_refused"), [("mid", True), ("long_axis", False)])
+def test_rotation_of_the_probe_is_not_taken_for_that_of_the_heart(errors, monkeypatch, view, is_refused):
+    """A long axis observes no rotation, and its strain has none of that motion."""
+    found = et.sample().case("healthy")
+    rocking = found.config.views[view].model_copy(update={"motion": ViewMotion(rocking_deg=3.0)})
+    config = found.config.model_copy(update={"views": found.config.views | {view: rocking}})
+    monkeypatch.setattr(Repository, "case", lambda self, case=None: replace(found, config=config))
+    if is_refused:
+        with pytest.raises(ObservationError, match=r"healthy: views\.mid\.motion\.rocking_deg = 3 adds to the rot"):
+            observe(et.sample(), "dis", "healthy", errors=errors)
+    else:
+        assert "rotation" in observe(et.sample(), "dis", "healthy", errors=errors)["quantity"]
 
 
 def test_what_is_not_in_the_repository_is_refused(errors):

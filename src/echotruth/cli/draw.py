@@ -47,12 +47,11 @@ def draw(arguments: argparse.Namespace) -> int:
 
     output = arguments.output or default_output(arguments.clip)
     begin = arguments.wall or output
-    drawn = part(said(begin, "part") or "")
     finds_sector = not (arguments.crop or begin.is_file())
-    if arguments.crop is None:
-        arguments.crop = drawn.crop if drawn else "sector" if finds_sector else None
+    if finds_sector:
+        arguments.crop = "sector"
     try:
-        clip = recording.read(arguments.clip, arguments)
+        clip = recording.read(arguments.clip, arguments, said(begin, "part") or "")
         server = drawing.DrawingServer(drawing.Drawing(clip, output, arguments.wall), arguments.port)
     except EchoError as error:
         return fail(str(error))

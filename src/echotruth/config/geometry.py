@@ -116,6 +116,12 @@ class Geometry(Section):
         wall = lengths["wall_mm"] * self.hypertrophy
         return round(self.scale * (lengths["endo_radius_mm"] * self.dilation + wall), 9)
 
+    def half_length_mm(self) -> float:
+        """Distance of the outer apex of the unloaded ellipsoid from the middle of its cavity's axis, mm."""
+        lengths = self.lengths()
+        cavity = (lengths["endo_length_mm"] + lengths["base_mm"]) * self.dilation * self.elongation
+        return round(self.scale * (cavity / 2 + lengths["apex_wall_mm"] * self.hypertrophy), 9)
+
     def cavity_uL(self) -> float:
         """Volume of the cavity of the unloaded ellipsoid, uL: of revolution, cut level above its equator."""
         lengths, width = self.lengths(), self.scale * self.dilation

@@ -10,7 +10,7 @@ from echotruth.config.cases import Cases
 from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import ALL_VIEWS, VIEWS, Bmode, Phantom, Rf, Views
+from echotruth.config.imaging import ALL_VIEWS, VIEWS, Bmode, Phantom, Rf, View, Views
 from echotruth.config.inference import Inference
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
@@ -114,13 +114,25 @@ class Config(Section):
 
     @check
     def _check_probes(self) -> None:
-        radius = 0.0 if self.geometry.file else self.geometry.outer_radius_mm()
         for name, view in self.views.items():
-            most = self.rf.focus_mm - radius
+            most = round(self.rf.focus_mm - self._reach_mm(view), 9)
             remedy = "brings the array into the heart: this, what drift.axial_mm is below 0, and the magnitude of "
-            remedy += f"breathing.axial_mm must be less than {most:g} together, rf.focus_mm less the heart's radius"
+            remedy += f"breathing.axial_mm must be less than {most:g} together, rf.focus_mm less how far the heart "
+            remedy += "reaches towards the array"
             near = view.approach_mm > 0 and view.approach_mm >= most
             self.require(not near, f"views.{name}.offset.axial_mm", remedy)
+
+    def _reach_mm(self, view: View) -> float:
+        """Upper bound of how far the unloaded ellipsoid reaches from what lies at the focus towards the array, mm."""
+        if self.geometry.file:
+            return 0.0
+        radius = self.geometry.outer_radius_mm()
+        if view.plane == "short_axis":
+            return radius
+        angle, half_length = np.deg2rad(view.angle_deg), self.geometry.half_length_mm()
+        along, across = half_length * np.cos(angle), radius * abs(np.sin(angle))
+        # The base has corners, the apex is round and its ellipsoid widest nearer to the base.
+        return float(np.hypot(along, across) if along > 0 else across - along)
 
     @check
     def _check_shape(self) -> None:

@@ -15,8 +15,8 @@ Reference = Annotated[
     Field(
         description="Frame with which each frame is compared: `ED`; or the `previous` one, with the steps added along "
         "the path of the tissue; or `bidirectional`, likewise from ED both forwards and, as the cycle closes, "
-        "backwards, and both averaged with weights from the correlation of the frames; a clip that is no closed cycle "
-        "is tracked forwards only, unless its last frame is like the first."
+        "backwards, and both averaged with weights from the correlation of the frames; a clip that is no closed cycle, "
+        "as of a view that drifts or breathes, is tracked forwards only, unless its last frame is like the first."
     ),
 ]
 
@@ -117,8 +117,8 @@ class BsplineDic(Section):
         Literal["previous", "bidirectional"],
         Field(
             description="Forwards from ED only (`previous`), or `bidirectional`: backwards too, as the cycle closes, "
-            "and both averaged with weights from their variances; a clip that is no closed cycle is tracked forwards "
-            "only, unless its last frame is like the first."
+            "and both averaged with weights from their variances; a clip that is no closed cycle, as of a view that "
+            "drifts or breathes, is tracked forwards only, unless its last frame is like the first."
         ),
     ] = "bidirectional"
 

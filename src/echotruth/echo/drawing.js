@@ -249,19 +249,19 @@ function play() {
 }
 
 // The cycle goes on to the end of the clip unless there is a next end-diastole after the one that is chosen.
-function begin_cycle() {
+function beginCycle() {
   const least = clip.fewest_frames;
   if (frame > clip.frames - least) return say(`A cycle needs ${least} frames: choose an earlier one.`, "error");
-  set_cycle(frame, cycle[1] < frame + least ? clip.frames : cycle[1]);
+  setCycle(frame, cycle[1] < frame + least ? clip.frames : cycle[1]);
 }
 
-function end_cycle() {
+function endCycle() {
   const least = clip.fewest_frames;
   if (frame < cycle[0] + least) return say(`Choose a frame ${least} or more after end-diastole, ${cycle[0]}.`, "error");
-  set_cycle(cycle[0], frame);
+  setCycle(cycle[0], frame);
 }
 
-function set_cycle(...frames) {
+function setCycle(...frames) {
   cycle = frames;
   unsaved = true;
   goTo(frame);
@@ -375,7 +375,7 @@ function listen() {
   addEventListener("beforeunload", event => unsaved && event.preventDefault());
   new ResizeObserver(draw).observe(canvas);
   const clicks = {undo, play, save, delete: () => change(() => remove(selected)), clear: () => change(clear),
-    first: begin_cycle, next: end_cycle};
+    first: beginCycle, next: endCycle};
   for (const [id, act] of Object.entries(clicks)) element(id).onclick = act;
   element("frame").oninput = event => goTo(Number(event.target.value));
   element("view").onchange = () => { unsaved = true; show(); };

@@ -88,7 +88,7 @@ class Drawing:
     Raises
     ------
     EchoError
-        If the output is no .csv, or there is no wall to be corrected in `begin`.
+        If the output is no .csv, there is no wall to be corrected in `begin`, or the clip does not hold its cycle.
     """
 
     clip: xr.Dataset
@@ -102,7 +102,7 @@ class Drawing:
             raise EchoError(f"{self.begin}: is not there: give a wall to be corrected, or none to draw a new one")
         if self.begin is None and self.output.is_file():
             self.begin = self.output
-        self.wall()  # so that what cannot be corrected is said at once
+        self._cycle(self.wall())  # so that what cannot be corrected is said at once
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -124,12 +124,22 @@ class Drawing:
         return part(self.clip.attrs.get("part", "")) or Part((0, frames), (0, 0, lateral, axial))
 
     def _cycle(self, wall: Wall | None) -> tuple[int, int]:
-        """Frames of the page at end-diastole and the next: those of the wall, or the first and the end of the clip."""
+        """Frames of the page at end-diastole and the next: those of the wall, or the first and the end of the clip.
+
+        Raises
+        ------
+        EchoError
+            If the clip does not hold those of the wall.
+        """
         start, stop = self._shown.cycle
         drawn = part(wall.part) if wall else None
-        if drawn and start <= drawn.cycle[0] < drawn.cycle[1] <= stop:
-            return drawn.cycle[0] - start, drawn.cycle[1] - start
-        return 0, stop - start
+        first, last = drawn.cycle if drawn else (start, stop)
+        if not start <= first < last <= stop:
+            raise EchoError(
+                f"{self.begin}: was drawn in frames {first} to {last}, and the clip shows {start} to {stop}: give a "
+                "cycle that holds them, or draw a new wall into another file"
+            )
+        return first - start, last - start
 
     def _clicked(self) -> dict[str, list[list[float]]]:
         """Points that were clicked, of the borders of which the file says them."""

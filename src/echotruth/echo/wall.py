@@ -18,6 +18,7 @@ from echotruth import files
 from echotruth.arrays import Floats
 from echotruth.echo.failure import EchoError, one_line
 from echotruth.echo.files import of_image
+from echotruth.echo.wall_file import part as part_of
 from echotruth.echo.wall_file import said
 
 View = Literal["basal", "mid", "apical", "four_chamber", "two_chamber", "three_chamber", "short_axis", "long_axis"]
@@ -342,7 +343,9 @@ def _of_table(file: Path, view: str) -> Wall:
     if given not in ([0, 0], [1, 1]):
         raise EchoError(f"{file}: give one anterior and one inferior insertion, or none")
     insertions = np.concatenate([points[part] for part in PARTS[2:]]) if sum(given) else None
-    return Wall(points["endocardium"], points["epicardium"], view, insertions, said(file, "part") or "")
+    text = said(file, "part") or ""
+    part_of(text)  # one that cannot be read is refused here, where the file has a name
+    return Wall(points["endocardium"], points["epicardium"], view, insertions, text)
 
 
 def _table(file: Path) -> pd.DataFrame:

@@ -5,6 +5,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from echotruth.echo.failure import EchoError
+
 
 @dataclass(frozen=True)
 class Part:
@@ -31,10 +33,21 @@ class Part:
 
 
 def part(text: str) -> Part | None:
-    """The part that a text names, or None."""
+    """The part that a text names, or None of an empty one.
+
+    Raises
+    ------
+    EchoError
+        If it names none that can be read, as one of an earlier version.
+    """
+    if not text:
+        return None
     match = re.fullmatch(r"cycle (\d+) (\d+), crop (\d+) (\d+) (\d+) (\d+)", text)
     if match is None:
-        return None
+        raise EchoError(
+            f'the part "{text}" in which the wall was drawn cannot be read: write "cycle FIRST STOP, crop LEFT TOP '
+            'RIGHT BOTTOM" in its place, which are what was given as --cycle and --crop'
+        )
     first, stop, left, top, right, bottom = map(int, match.groups())
     return Part((first, stop), (left, top, right, bottom))
 

@@ -86,7 +86,7 @@ def observe(
     ------
     ValueError
         If there is no such case, tracker or size, or it was not evaluated; if the error of the tracker is not known; or
-        if it saw no segment.
+        if it saw no segment; or if a short axis rocks, which adds to the rotation of the heart.
 
     Examples
     --------
@@ -124,13 +124,14 @@ def seen_of(repository: Repository, case: Case, tracker: str, size: int) -> Iter
     Raises
     ------
     ValueError
-        If it was evaluated on none.
+        If it was evaluated on none, or a short axis rocks.
     """
     problems, count = [], 0
     for view in repository.views:
         if problem := repository.problem(case.id, view, "truth", "tracking"):
             problems.append(problem)
             continue
+        _check_rotation(case, view)
         try:
             yield from _seen_in(repository, case.id, view, tracker, size)
         except NotEvaluated as error:
@@ -139,6 +140,14 @@ def seen_of(repository: Repository, case: Case, tracker: str, size: int) -> Iter
         count += 1
     if not count:
         raise ObservationError(problems[0] if problems else f"{case.id}: the repository has no view")
+
+
+def _check_rotation(case: Case, name: str) -> None:
+    """Raise an :class:`ObservationError` if a view adds to the rotation of the heart, which a short axis observes."""
+    view = case.config.views[name]
+    if view.plane == "short_axis" and view.motion.rocking_deg != 0:
+        key = f"views.{name}.motion.rocking_deg = {view.motion.rocking_deg:g}"
+        raise ObservationError(f"{case.id}: {key} adds to the rotation of the heart: infer from a view where it is 0")
 
 
 def _seen_in(repository: Repository, case: str, view: str, tracker: str, size: int) -> Iterator[Seen]:

@@ -246,7 +246,24 @@ def rim(nodes: Floats, facets: NDArray[np.int32]) -> tuple[Floats, float]:
     edges, number, count = triangle_edges(facets[:, :3].astype(np.int32))
     vertices = nodes[np.unique(edges[count[number] == 1])]
     centre = vertices.mean(axis=0)
-    return centre, float(_radius(vertices, centre).mean())
+    return centre, float(np.linalg.norm(vertices - centre, axis=1).mean())
+
+
+def rim_normal(nodes: Floats, endo: NDArray[np.int32]) -> Floats:
+    """Mean unit normal (3,), out of the cavity, of the rim of an endocardium (n_facets, 6) with normals into it.
+
+    Endocardium and lid are closed together, so that the areas of the facets, as vectors, add up to that of the lid.
+    """
+    a, b, c = nodes[endo[:, :3]].swapaxes(0, 1)
+    area = np.cross(b - a, c - a).sum(axis=0)
+    return area / np.linalg.norm(area)
+
+
+def above_lid(nodes: Floats, endo: NDArray[np.int32], position: Floats) -> NDArray[np.bool_]:
+    """Whether positions (n, 3), m, are in the column above the lid of the cavity, (n,), perpendicular to it."""
+    (centre, radius), normal = rim(nodes, endo), rim_normal(nodes, endo)
+    height = (position - centre) @ normal
+    return (height >= 0) & (np.linalg.norm(position - centre - height[:, None] * normal, axis=1) <= radius)
 
 
 def _radius(position: Floats, centre: Floats) -> Floats:

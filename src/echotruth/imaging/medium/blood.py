@@ -13,6 +13,7 @@ import numpy as np
 
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats, Integers, MaterialPoints, interpolate, jacobian
+from echotruth.imaging.medium.anatomy import rim_normal
 from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
 from echotruth.imaging.medium.random_process import RandomProcess, brownian, diffusion_std
 from echotruth.imaging.medium.wall import draw_in_cells, max_jacobian
@@ -107,7 +108,7 @@ class Blood(Body):
     def __call__(self, frame: int) -> Echoes:
         """Those that are present in a frame.
 
-        A random offset that leads into the wall or beyond the centre of the base is reversed; if the reversed one does
+        A random offset that leads into the wall or beyond the plane of the rim is reversed; if the reversed one does
         so too, it is set to zero.
         """
         heart, cells, nodes = self.scene.heart, self._cavity.cells, self._nodes(frame)
@@ -115,11 +116,12 @@ class Blood(Body):
         present = self.jacobian_threshold < determinant
         points = MaterialPoints(self.cell[present], self.xi[present])
         carried, offset = interpolate(nodes, cells, points), self._diffusion(frame)[present]
+        upwards = rim_normal(heart.positions(frame), heart.endo)
         pending = np.arange(len(points))
         for factor in (-1, 0):
             position = carried[pending] + offset[pending]
             in_wall = locate(heart.positions(frame), heart.cells, position).cell >= 0
-            pending = pending[in_wall | (position[:, 2] > nodes[0, 2])]
+            pending = pending[in_wall | ((position - nodes[0]) @ upwards > 0)]
             offset[pending] *= factor
         position = self.scene.plane.to_image(carried + offset)
         return echoes(self.scene.config.realism.blood, position, self.amplitude[present])

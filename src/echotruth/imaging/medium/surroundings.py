@@ -22,8 +22,8 @@ from echotruth.imaging.medium.anatomy import (
     WALLS,
     Anatomy,
     Place,
+    above_lid,
     chest_wall_depth,
-    rim,
     strata_dB,
 )
 from echotruth.imaging.medium.blood import Cavity
@@ -230,10 +230,8 @@ def outside_heart(heart: Heart, frame: int, position: Floats, *, column: bool = 
 
     That column is the atrium; `column` says whether it counts as outside, because its blood and its walls scatter.
     """
-    # Undone, since the long axis turns with a probe that rocks.
-    nodes, position = (heart.without_rigid(frame, each) for each in (heart.positions(frame), position))
-    centre, radius, cavity = *rim(nodes, heart.endo), Cavity(heart.endo)
-    outside = column | (position[:, 2] < centre[2]) | (np.hypot(*(position - centre)[:, :2].T) > radius)
+    nodes, cavity = heart.positions(frame), Cavity(heart.endo)
+    outside = column | ~above_lid(nodes, heart.endo, position)
     outside[outside] = locate(nodes, heart.cells, position[outside]).cell < 0
     outside[outside] = locate(cavity.positions(nodes), cavity.cells, position[outside]).cell < 0
     return outside

@@ -19,7 +19,7 @@ from echotruth.fem.location import locate
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.labels import TissueLabel
-from echotruth.imaging.medium.anatomy import FOLLOWING_BASE, rim
+from echotruth.imaging.medium.anatomy import FOLLOWING_BASE, above_lid
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.mitral_valve import MitralValve
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
@@ -126,10 +126,8 @@ class TissueImages:
 
     def _above_lid(self, frame: int) -> NDArray[np.bool_]:
         """Pixels above the lid of the cavity, (n_axial, n_lateral), where no tissue is around the heart."""
-        heart = self._heart
-        centre, radius = rim(heart.without_rigid(frame, heart.positions(frame)), heart.endo)
-        x, y, z = (heart.without_rigid(frame, self._position) - centre).T
-        return ((z >= 0) & (np.hypot(x, y) <= radius)).reshape(len(self._axial), -1)
+        nodes = self._heart.positions(frame)
+        return above_lid(nodes, self._heart.endo, self._position).reshape(len(self._axial), -1)
 
     def _set_cavity(self, frame: int, flat: Labels) -> None:
         if self._config.geometry.shape == "tube":
