@@ -68,7 +68,7 @@ def test_report_lists_it(repository):
 
 def test_viewer_says_it(repository):
     found, expected = repository
-    page = Page(found, first(found), Document())
+    page = Page(found, first(found), "", Document())
     page.show()
     said = page.message.text
     assert f"one has no estimate of this strain: {expected.removesuffix('.*')}" in said

@@ -33,7 +33,10 @@ KNOWN = dict.fromkeys(
 def heart():
     mesh = {"circumferential_elements": 18, "longitudinal_elements": 6, "transmural_elements": 1}
     config = et.configure(
-        geometry=mesh, loop={"frames": 8}, mechanics={"regional": {"contractility": TRUE}}, tracking={"grid_px": 8}
+        geometry=mesh,
+        loop={"frames": 8},
+        mechanics={"regional": {"preset": "even", "contractility": TRUE}},
+        tracking={"grid_px": 8},
     )
     return et.beat(config, frames=et.systole(config))
 

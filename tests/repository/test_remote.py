@@ -57,7 +57,7 @@ def test_learning_names_the_address_where_something_is_missing(address, reposito
 
 def test_viewer_shows_an_address(address):
     found = opened(address)
-    page = Page(found, first(found), Document())
+    page = Page(found, first(found), "", Document())
     assert page.choice.view == "mid"
 
 
