@@ -152,21 +152,23 @@ def _distinct(hearts: list[tuple[Combination, Case]], name: str, source: str) ->
 
 
 def _check_loops(hearts: list[tuple[Combination, Case]], source: str) -> None:
-    """Check each loop once for each size of heart that beats through it."""
+    """Check each loop once; where one of its volumes is given, for each size of heart that sets the other."""
     from echotruth.loop.calibration import closed_valves
     from echotruth.loop.cycle import LoopError, check_loop, read_loop, size
 
     known: set[tuple[str, float]] = set()
     for heart, case in hearts:
-        loop, factor = case.config.loop, size(case.config)
-        found = loop.model_dump_json(), factor
+        loop = case.config.loop
+        factor = size(case.config) if (loop.edv_uL is None) != (loop.esv_uL is None) else 1.0
+        found = loop.model_dump_json(exclude={"circulation"}), factor
         if found in known:
             continue
         known.add(found)
         try:
-            check_loop(loop, factor)
             if loop.kind == "circulation":
                 closed_valves(read_loop(loop, factor))
+            else:
+                check_loop(loop, factor)
         except LoopError as error:
             is_swept = heart.origin and any(key.startswith(("loop.", "geometry.")) for key in heart.parameters)
             place = f"{source}: {heart.origin}" if is_swept else source
