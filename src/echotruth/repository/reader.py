@@ -17,7 +17,7 @@ from echotruth.config import Config, shipped
 from echotruth.config.diagnosis import DECISIVE, bounds_of
 from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
-from echotruth.imaging.view import Plane, before_probe
+from echotruth.imaging.view import Plane, before_probe, imaging_plane
 from echotruth.repository import estimates, group, metadata, schema, status
 from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
 from echotruth.repository.group import NotWritten
@@ -546,7 +546,8 @@ class Repository:
 
     def plane(self, case: str, view: str) -> Plane:
         """The imaging plane of a view in the heart frame, at end-diastole."""
-        return self.before_probe(case, view)[1]
+        config = self.case(case).config
+        return imaging_plane(config.views[view], config.rf, self.heart(case).endo_at_ed)
 
     def path(self, group: str, case: str, view: str | None = None) -> str:
         """Path of a group below the store.
