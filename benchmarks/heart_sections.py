@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from echotruth.fem.tetrahedra import EDGES, NODE_XI, Mesh, shape
+from echotruth.fem.tetrahedra import EDGES, NODE_XI, PARTS, Mesh, shape
 from echotruth.heart import SHORT_AXIS, Heart
 from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING
 from echotruth.mechanics import fibres, kinematics
@@ -24,11 +24,6 @@ Floats = NDArray[np.float64]
 
 CC = ((1, 1),)
 """The component of strain that is shown."""
-
-PARTS = np.array(
-    [(0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 9, 5, 6), (4, 9, 6, 7), (4, 9, 7, 8), (4, 9, 8, 5)]
-)
-"""Nodes of eight tetrahedra that fill one: four at its corners, and four around the line 49."""
 
 HALVINGS = 3
 """Of the edges of an element, so that the sections of curved elements look curved."""

@@ -3,9 +3,9 @@
 The bounds lie several times and more above the default heart, and are checked before anything is made.
 """
 
-from math import floor, isqrt, pi
+from math import floor, isqrt
 
-from echotruth.config.anatomy import Lengths
+from echotruth.config.anatomy import Lengths, ellipsoid_mm3
 from echotruth.config.cases import Cases
 from echotruth.config.geometry import Geometry
 from echotruth.config.imaging import Bmode, Phantom
@@ -92,9 +92,4 @@ def ventricle_mm3(lengths: Lengths, scale: float = 1.0) -> tuple[float, float]:
     """
     radius, length, base = (lengths[key] * scale for key in ("endo_radius_mm", "endo_length_mm", "base_mm"))
     wall, apex_wall = lengths["wall_mm"] * scale, lengths["apex_wall_mm"] * scale
-    return _truncated_mm3(radius, length, base), _truncated_mm3(radius + wall, length + apex_wall, base)
-
-
-def _truncated_mm3(radius: float, length: float, base: float) -> float:
-    """Integral of pi radius^2 (1 - z^2 / length^2) from the apex at -length to the base, mm^3."""
-    return pi * radius**2 * (length + base - (length**3 + base**3) / (3 * length**2))
+    return ellipsoid_mm3(radius, length, base), ellipsoid_mm3(radius + wall, length + apex_wall, base)

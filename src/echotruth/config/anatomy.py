@@ -21,6 +21,7 @@ human
 
 from __future__ import annotations
 
+from math import pi
 from typing import TYPE_CHECKING, Literal
 
 Lengths = dict[str, float]
@@ -36,3 +37,11 @@ if TYPE_CHECKING:
 else:
     Species = Literal[tuple(HEART_PRESETS)]
 """What `geometry.preset` may be; a type checker cannot read names from a table."""
+
+
+def ellipsoid_mm3(radius: float, length: float, base: float) -> float:
+    """Volume, mm^3, of an ellipsoid of semi-axes across and along, cut at a height above its equator, mm.
+
+    The integral of pi radius^2 (1 - z^2 / length^2) from the apex at -length to the base.
+    """
+    return pi * radius**2 * (length + base - (length**3 + base**3) / (3 * length**2))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from math import pi
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, FiniteFloat
 
-from echotruth.config.anatomy import HEART_PRESETS, Lengths, Species
+from echotruth.config.anatomy import HEART_PRESETS, Lengths, Species, ellipsoid_mm3
 from echotruth.section import Positive, Section, check, invalid
 
 Factor = Annotated[FiniteFloat, Field(ge=0.2, le=5)]
@@ -125,9 +124,10 @@ class Geometry(Section):
     def cavity_uL(self) -> float:
         """Volume of the cavity of the unloaded ellipsoid, uL: of revolution, cut level above its equator."""
         lengths, width = self.lengths(), self.scale * self.dilation
-        radius, along = lengths["endo_radius_mm"] * width, width * self.elongation
-        length, base = lengths["endo_length_mm"] * along, lengths["base_mm"] * along
-        return pi * radius**2 * (2 / 3 * length + base - base**3 / (3 * length**2))
+        along = width * self.elongation
+        return ellipsoid_mm3(
+            lengths["endo_radius_mm"] * width, lengths["endo_length_mm"] * along, lengths["base_mm"] * along
+        )
 
     def resolved(self) -> Geometry:
         """The section with the lengths of the preset filled in, if the shape is not read from a file."""

@@ -22,6 +22,11 @@ _VERTEX_XI = np.vstack([np.zeros(3), np.eye(3)])
 NODE_XI = np.vstack([_VERTEX_XI, _VERTEX_XI[EDGES].mean(axis=1)])
 """Local coordinates of the nodes of a tetrahedron."""
 
+PARTS = np.array(
+    [(0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 9, 5, 6), (4, 9, 6, 7), (4, 9, 7, 8), (4, 9, 8, 5)]
+)
+"""Nodes of the eight straight tetrahedra of a quadratic one: four at its corners, and four around the line 49."""
+
 
 @dataclass(frozen=True)
 class Mesh:

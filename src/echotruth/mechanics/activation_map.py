@@ -22,7 +22,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config, Fibres
 from echotruth.config.pathology import Activation, Site
 from echotruth.fem.location import locate
-from echotruth.fem.tetrahedra import NODE_XI, Integers, Mesh, straight_triangles
+from echotruth.fem.tetrahedra import NODE_XI, PARTS, Integers, Mesh, straight_triangles
 from echotruth.mechanics import fibres
 from echotruth.mechanics.eikonal import arrival_times
 from echotruth.mechanics.pathology import HEALTHY, LATE, PathologyError, Tissue, wall_point
@@ -37,11 +37,6 @@ SITES = {
     "rv_pacing": [Site(position=0.85, azimuth_deg=0.0, depth=1.0)],
 }
 """Sites of each preset."""
-
-_PARTS = np.array(
-    [(0, 4, 6, 7), (4, 1, 5, 8), (6, 5, 2, 9), (7, 8, 9, 3), (4, 9, 5, 6), (4, 9, 6, 7), (4, 9, 7, 8), (4, 9, 8, 5)]
-)
-"""Nodes of the eight straight tetrahedra of a quadratic one: four at its corners, and four around the line 49."""
 
 
 def activated(tissue: Tissue, mesh: Mesh, depth: Floats, config: Config) -> Tissue:
@@ -84,8 +79,8 @@ def _delays(mesh: Mesh, depth: Floats, activation: Activation, rule: Fibres, see
 
 def activation_times(mesh: Mesh, depth: Floats, activation: Activation, rule: Fibres, seed: int = 0) -> Floats:
     """Times (n_nodes,), s, at which the nodes of a wall are activated; parameters as of :func:`activated`."""
-    fibre = fibres.fibre_frames(mesh, depth, rule, NODE_XI[_PARTS].mean(axis=1), seed)[..., 0, :]
-    parts = mesh.cells[:, _PARTS].reshape(-1, 4)
+    fibre = fibres.fibre_frames(mesh, depth, rule, NODE_XI[PARTS].mean(axis=1), seed)[..., 0, :]
+    parts = mesh.cells[:, PARTS].reshape(-1, 4)
     metric = _metric(fibre, activation)
     start = np.full(len(mesh.nodes), np.inf)
     for site in SITES[activation.preset] if activation.preset else activation.sites or []:

@@ -26,7 +26,7 @@ from echotruth.fem.tetrahedra import shape, shape_gradient
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.view import Plane
-from echotruth.mechanics.geometry.boundary import triangle_edges
+from echotruth.mechanics.geometry.boundary import area_vectors, triangle_edges, unit_vector
 
 SEPTUM_HALF_ANGLE = pi / 3
 """Azimuth of the insertions of the right ventricle, rad: the septum is two of six AHA segments."""
@@ -254,9 +254,7 @@ def rim_normal(nodes: Floats, endo: NDArray[np.int32]) -> Floats:
 
     Endocardium and lid are closed together, so that the areas of the facets, as vectors, add up to that of the lid.
     """
-    a, b, c = nodes[endo[:, :3]].swapaxes(0, 1)
-    area = np.cross(b - a, c - a).sum(axis=0)
-    return area / np.linalg.norm(area)
+    return unit_vector(area_vectors(nodes, endo).sum(axis=0))
 
 
 def above_lid(nodes: Floats, endo: NDArray[np.int32], position: Floats) -> NDArray[np.bool_]:
