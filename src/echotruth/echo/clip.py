@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.arrays import Floats
 from echotruth.echo import files, sector
-from echotruth.echo.failure import EchoError, unsaid
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, unsaid
 from echotruth.echo.recording import Recording, check_size
 from echotruth.echo.wall_file import Part
 from echotruth.echo.wall_file import part as part_of
@@ -20,8 +20,6 @@ SQUARE = 1e-3
 """Relative difference of the sides of a pixel from which an image is resampled to square pixels."""
 SIDES_MM, STEPS_MS = (0.001, 10.0), (0.01, 1000.0)
 """Shortest and longest side of a pixel, and time from frame to frame, of an echo of any heart."""
-FEWEST_FRAMES = 3
-"""Frames of the shortest cycle: end-diastole, end-systole and one between or after."""
 LARGEST_RATIO = 100.0
 """Longer side of a pixel over the shorter."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.echo.failure import EchoError, one_line, optional
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, one_line, optional
 from echotruth.echo.recording import Recording, grey
 
 TWO_DIMENSIONAL, CENTIMETRES = 1, 3
@@ -43,7 +43,7 @@ def read(path: Path) -> Recording:
         raise EchoError(f"{path}: is no DICOM clip that can be decoded: {one_line(error)}") from None
     colours = int(getattr(image, "SamplesPerPixel", 1)) > 1
     if pixels.ndim != 3 + colours:
-        raise EchoError(f"{path}: has 1 frame: a clip needs 3 or more")
+        raise EchoError(f"{path}: has 1 frame: a clip needs {FEWEST_FRAMES} or more")
     try:
         return _recording(image, pixels, path)
     except EchoError:

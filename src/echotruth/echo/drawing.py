@@ -18,8 +18,7 @@ import numpy as np
 import xarray as xr
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from echotruth.echo.clip import FEWEST_FRAMES
-from echotruth.echo.failure import EchoError
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError
 from echotruth.echo.wall import PARTS, View, Wall, clicked_points, read_wall, write_wall
 from echotruth.echo.wall_file import Part, part, said
 

@@ -6,6 +6,8 @@ from typing import Any
 
 FACTS = {"spacing_mm": "the side of its pixels", "frame_time_ms": "the time from frame to frame", "view": "its view"}
 """Options that say what a file may not, and what that is."""
+FEWEST_FRAMES = 3
+"""Frames of the shortest cycle: end-diastole, end-systole and one between or after."""
 
 
 class EchoError(ValueError):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from echotruth.echo import dicom
-from echotruth.echo.failure import EchoError, one_line, optional
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, one_line, optional
 from echotruth.echo.recording import Recording, check_size, grey
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -55,7 +55,7 @@ def _folder(path: Path) -> Recording:
     files = sorted(images, key=natural_order)
     frames = [(file, page) for file in files for page in _pages(file)]
     if not frames:
-        raise EchoError(f"{path}: has no images: a clip needs 3 or more ({', '.join(IMAGES)})")
+        raise EchoError(f"{path}: has no images: a clip needs {FEWEST_FRAMES} or more ({', '.join(IMAGES)})")
     return _clip(frames, path)
 
 
