@@ -86,13 +86,30 @@ REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 over those of the array."""
 REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
-REALISM_IMAGE: dict[str, float] = {
+REALISM_IMAGE: dict[str, Any] = {
+    "probe.attenuation_dB_per_cm_MHz": 0.5,
     "bmode.dynamic_range_dB": 50.0,
-    "bmode.gain_dB": -13.0,
+    "bmode.gain_dB": -14.0,
     "bmode.grey_gamma": 1.3,
     "bmode.smoothing": 0.65,
+    "bmode.dropout.edge_loss_dB": 14.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
+REALISM_SCAN: dict[str, dict[str, Any]] = {
+    "mouse": {
+        "bmode.time_gain.range_mm": [1.2, 2.0, 2.8, 3.6, 6.0, 9.0, 12.0, 15.0],
+        "bmode.time_gain.gain_dB": [8.0, 5.0, 3.0, 0.0, 1.5, 4.0, 7.0, 9.0],
+    },
+    "human": {
+        "rf.focus_mm": 76.0,
+        "rf.sector_deg": 85.0,
+        "bmode.field_of_view_mm": 180.0,
+        "bmode.time_gain.range_mm": [15.0, 25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 190.0],
+        "bmode.time_gain.gain_dB": [8.0, 3.0, 0.0, 2.0, 6.0, 10.0, 13.0, 15.0],
+    },
+}
+"""`realism.preset` -> default of dotted keys: gain over range by which tissue is as bright at any range, as measured in
+an even medium before the default array; and a scan that shows the roof of the atria."""
 
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""
@@ -152,7 +169,7 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     if name not in REALISM_BANDWIDTHS:
         return {}
     width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
-    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)}
+    found = REALISM_IMAGE | REALISM_SCAN[name] | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)}
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
     share, density = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3"

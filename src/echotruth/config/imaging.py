@@ -215,8 +215,11 @@ class Dropout(Section):
     loss_dB: Annotated[FiniteFloat, Field(ge=0, le=60)] = 0.0
     """Size of the loss: that of a line is this times the positive part of a smooth random function of unit variance,
     the same in all frames of a view; half of the lines have none. 0 for no loss."""
+    edge_loss_dB: Annotated[FiniteFloat, Field(ge=0, le=60)] = 0.0
+    """Further loss of the outermost lines, where beams are steered most; towards the middle it falls to 0 as the square
+    of the distance from it."""
     width: Annotated[FiniteFloat, Field(ge=0.02, le=1)] = 0.1
-    """Distance over which the loss changes, as a fraction of the scan: standard deviation of its Gaussian
+    """Distance over which the first loss changes, as a fraction of the scan: standard deviation of its Gaussian
     correlation."""
 
 
@@ -290,14 +293,14 @@ VIEWS: dict[str, dict[str, View]] = {
         "basal": View(position=0.25),
         "mid": View(position=0.5),
         "apical": View(position=0.8),
-        "four_chamber": View(plane="long_axis", rotation_deg=-30),
-        "two_chamber": View(plane="long_axis", rotation_deg=-90),
-        "three_chamber": View(plane="long_axis", rotation_deg=-150),
+        "four_chamber": View(plane="long_axis", rotation_deg=-30, angle_deg=10),
+        "two_chamber": View(plane="long_axis", rotation_deg=-90, angle_deg=-8),
+        "three_chamber": View(plane="long_axis", rotation_deg=-150, angle_deg=10),
     },
 }
 """Views of each `views.preset`: the paper's, and those of an echo, whose long axes go through the middles of AHA
 segments in the usual display - the inferoseptal, the inferior and the inferolateral wall at the left - so that together
-they show all of a bullseye. The basal plane is low enough for the base not to pass it as it descends."""
+they show all of a bullseye; turned a little, by eye, as the axis of a heart is seldom that of the beam. The basal plane is low enough for the base not to pass it as it descends."""
 
 
 def named_views(value: Any) -> Any:

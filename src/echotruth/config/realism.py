@@ -65,6 +65,8 @@ class Neighbours(Section):
     """Walls of the right ventricle and of both atria, whose cavities have the level of `blood`."""
     lung_dB: Level | None = None
     """Lung behind the free wall, at the epicardium, from which on it fades."""
+    posterior_dB: Level | None = None
+    """What lies behind the atria, at their roof, from which on it fades: pericardium, oesophagus, spine."""
     chest_wall_dB: Level | None = None
     """Brightest layers of the chest wall, between `surroundings.start_mm` and the heart."""
     leaflets_dB: BorderLevel | None = None
@@ -81,7 +83,7 @@ class Neighbours(Section):
     @property
     def around(self) -> dict[str, float | None]:
         """Levels, dB, of those that are tissues of the surroundings, by key."""
-        return {key: getattr(self, key) for key in ("chambers_dB", "lung_dB", "chest_wall_dB")}
+        return {key: getattr(self, key) for key in ("chambers_dB", "lung_dB", "posterior_dB", "chest_wall_dB")}
 
 
 class Noise(Section):
@@ -142,35 +144,46 @@ class Borders(Section):
     """That of epicardium and pericardium."""
 
 
-def _preset(scale: float, times_ms: tuple[float, float]) -> dict[str, Any]:
-    """Keys of a preset: lengths are those of a mouse times `scale`, times those of tissue and of blood."""
-    return {
+def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any]) -> dict[str, Any]:
+    """Keys of a preset: lengths are those of a mouse times `scale`, times those of tissue and of blood.
+
+    Some are of the heart alone.
+    """
+    preset = {
         "backscatter": {
             "anisotropy_dB": 8.0,
-            "fibre_strain_dB": 30.0,
             "variation_dB": 3.0,
             "variation_length_mm": scale,
         },
         "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
         "decorrelation": {"time_ms": times_ms[0]},
-        "blood": {"level_dB": -16.5, "density": 0.15, "decorrelation_time_ms": times_ms[1]},
-        "surroundings": {"level_dB": -11.0, "density": 0.15, "start_mm": scale, "motion_decay_mm": scale},
+        "blood": {"level_dB": -24.0, "decorrelation_time_ms": times_ms[1]},
+        "surroundings": {"level_dB": -9.0, "start_mm": scale, "motion_decay_mm": scale},
         "neighbours": {
             "chambers_dB": 0.0,
             "lung_dB": -1.0,
+            "posterior_dB": 3.0,
             "chest_wall_dB": -1.0,
             "leaflets_dB": 12.0,
             "papillary_muscles_dB": 0.0,
         },
-        "noise": {"snr_dB": 40.0},
-        "haze": {"level_dB": -16.0, "max_source_range_mm": 4 * scale, "mean_extra_range_mm": 2 * scale},
+        "haze": {"level_dB": -8.0, "max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
     }
+    return merged(preset, of_heart)
 
 
 REALISM_PRESETS: dict[str, dict[str, Any]] = {
     "none": {},
-    "mouse": _preset(1.0, (500.0, 14.0)),
-    "human": _preset(12.5, (350.0, 98.0)),
+    "mouse": _preset(1.0, (500.0, 14.0), {"backscatter": {"fibre_strain_dB": 30.0}, "noise": {"snr_dB": 60.0}}),
+    "human": _preset(
+        12.5,
+        (350.0, 98.0),
+        {
+            "backscatter": {"fibre_strain_dB": 10.0},
+            "noise": {"snr_dB": 75.0},
+            "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -4.0},
+        },
+    ),
 }
 """Values of keys of each `realism.preset`; docs/realism.md says what they were fitted to."""
 
@@ -180,8 +193,9 @@ class Realism(Section):
 
     preset: Literal["none", "mouse", "human"] = "none"
     """Levels, lengths and times of the keys below that are not given: as in clips of such hearts, or all off. With
-    `mouse` and `human` the defaults of `probe.bandwidth`, `phantom.density_per_mm3` and of gain, smoothing and grey map
-    in `bmode` change too, but not where `cases` change this key from heart to heart."""
+    `mouse` and `human` the defaults of `probe.bandwidth`, `probe.attenuation_dB_per_cm_MHz`, `phantom.density_per_mm3`
+    and of gain, edges, smoothing and grey map in `bmode` change too, with `human` also those of focus, sector and depth,
+    but not where `cases` change this key from heart to heart."""
     backscatter: Backscatter = Backscatter()
     """Echo of muscle that depends on its fibres; its mean over all directions at end-diastole stays what it was."""
     borders: Borders = Borders()

@@ -40,7 +40,7 @@ class Acquisition:
         if realism.haze.level_dB is not None:
             echoes = reverberation(realism.haze, config.probe, imaging_depth(config.rf, config.bmode), random("haze"))
             self._haze_range = realism.haze.si().max_source_range
-            self._filter = 1 + reverberation_filter(echoes, scanner.matrix.frequency, config.probe.si().sound_speed)
+            self._filter = 1 + reverberation_filter(echoes, config.probe, scanner.matrix.frequency)
         if realism.shadow.side != "none":
             self._matrix = scanner.matrix.behind(Rib(realism.shadow))
         snr = realism.noise.snr_dB

@@ -46,6 +46,7 @@ def line_loss(bmode: Bmode, lines: int, random: np.random.Generator) -> np.ndarr
     phase = random.uniform(0, 2 * np.pi, DROPOUT_WAVES)
     waves = np.cos(np.linspace(0, 1, lines)[:, None] * wave_number + phase)
     loss = bmode.dropout.loss_dB * np.maximum(np.sqrt(2 / DROPOUT_WAVES) * waves.sum(axis=1), 0)
+    loss += bmode.dropout.edge_loss_dB * np.linspace(-1, 1, lines) ** 2
     return (10 ** (-loss / 20)).astype(np.float32)
 
 
@@ -68,7 +69,9 @@ def clip_gain(probe: Probe, bmode: Bmode, lines: int, range_: np.ndarray, random
     Shape (ranges,), or (lines, ranges) if scan lines drop out, 1, float32.
     """
     gain = time_gain_compensation(probe, bmode, range_)
-    return line_loss(bmode, lines, random)[:, None] * gain if bmode.dropout.loss_dB else gain
+    dropout = bmode.dropout
+    drops = dropout.loss_dB or dropout.edge_loss_dB
+    return line_loss(bmode, lines, random)[:, None] * gain if drops else gain
 
 
 def envelope(lines: np.ndarray, gain: np.ndarray | float = 1.0) -> np.ndarray:

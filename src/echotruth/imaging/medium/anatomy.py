@@ -4,14 +4,17 @@ The heart that is solved is a left ventricle alone. What lies around it in life 
 and in proportion to it, so that it suits a mouse and a human:
 
 - the right ventricle, a crescent on the septal side (+x): with u the azimuth over 60 degrees and v the height below the
-  base over 0.85 of that of the epicardium, its cavity is W (1 - u^2) (1 - v^2) wide;
-- the atria, domes above the base: the left on the rim of the cavity, the right between it and the right free wall;
+  base over 0.85 of that of the epicardium, its cavity is W (1 - u^2) (1 - v^3) wide;
+- the atria, blunt domes above the base, (r / R)^3 + (z / H)^3 < 1: the left on the rim of the cavity, the right between
+  it and the right free wall;
+- what lies behind the atria as the probe sees it: pericardium, oesophagus, spine;
 - the lung, behind the free wall as the probe sees it;
 - the chest wall, between the start of the tissue and the heart.
 
-Lengths are in outer radii R of the left ventricle. In adults, with R of 33 mm, the mid diameter of the right ventricle
-is 27 +- 4 mm, its length 71 +- 6 mm, its wall 3 +- 1 mm, and its fractional area change 49 +- 7 % with a lower limit of
-35 % (Lang et al., J Am Soc Echocardiogr 28 (2015) 1). The other lengths were chosen by eye.
+Lengths are in outer radii R of the left ventricle. In adults, with R of 33 mm, the right ventricle is 33 +- 4 mm wide
+at its base and 27 +- 4 mm in its middle, 71 +- 6 mm long, its wall 3 +- 1 mm thick, and its fractional area change
+49 +- 7 % with a lower limit of 35 % (Lang et al., J Am Soc Echocardiogr 28 (2015) 1). The other lengths were chosen by
+eye.
 """
 
 from dataclasses import dataclass
@@ -30,19 +33,22 @@ from echotruth.mechanics.geometry.boundary import area_vectors, triangle_edges, 
 
 SEPTUM_HALF_ANGLE = pi / 3
 """Azimuth of the insertions of the right ventricle, rad: the septum is two of six AHA segments."""
-RIGHT_WIDTH, RIGHT_LENGTH, RIGHT_WALL, RIGHT_SHORTENING = 0.75, 0.85, 0.1, 0.4
+RIGHT_WIDTH, RIGHT_LENGTH, RIGHT_WALL, RIGHT_SHORTENING = 1.0, 0.85, 0.1, 0.4
 """Greatest width of the right ventricle and thickness of its wall, in R; its length over the height of the epicardium;
 and the share of its width that it loses by end-systole."""
 ATRIAL_HEIGHT, ATRIAL_WALL = 1.35, 0.08
 """Height of the atria above the base and thickness of their walls, in R."""
 LUNG_FADING_DB = 25.0
 """Fall of the echo of lung over R."""
+POSTERIOR_FADING_DB, POSTERIOR_NARROWNESS = 20.0, 4
+"""Fall of the echo of what lies behind the atria over R, and power of the cosine of the angle from the axis of the
+beam by which there is less of it to the sides; by eye."""
 CHEST_WALL_SHARE = 0.8
 """Depth of the chest wall over that of the heart, both from the start of the tissue."""
-STRATA = ((0.0, 0.0), (0.1, -14.0), (0.3, -2.0), (0.36, -10.0), (0.62, 0.0), (0.68, -12.0), (0.92, -1.0))
+STRATA = ((0.0, 0.0), (0.1, -7.0), (0.3, -2.0), (0.36, -5.0), (0.62, 0.0), (0.68, -6.0), (0.92, -1.0))
 """Layers of the chest wall: depth at which each begins, over that of the chest wall, and level relative to the
 brightest, dB; skin, fat, fascia, muscle, fascia, muscle, pleura. By eye."""
-UNDULATION = ((2.3, 0.045, 0.4), (0.9, 0.025, 2.1), (0.41, 0.012, 5.0))
+UNDULATION = ((2.3, 0.08, 0.4), (0.9, 0.05, 2.1), (0.41, 0.03, 5.0))
 """Waves of the layers of the chest wall: length and amplitude over its depth, and phase, rad; by eye."""
 SUBDIVISIONS = 6
 """Parts of the edge of a facet between points from which the nearest point of the epicardium is sought."""
@@ -124,7 +130,7 @@ class Anatomy:
         apex = self._epicardium.data[:, 2].min()
         azimuth = np.arctan2(*(nearest - self.base)[:, 1::-1].T) / SEPTUM_HALF_ANGLE
         below = (self.base[2] - nearest[:, 2]) / (RIGHT_LENGTH * (self.base[2] - apex))
-        width = np.maximum(1 - azimuth**2, 0) * np.clip(1 - np.maximum(below, 0) ** 2, 0, None)
+        width = np.maximum(1 - azimuth**2, 0) * np.clip(1 - np.maximum(below, 0) ** 3, 0, None)
         return Place(
             distance,
             (position - nearest) / np.maximum(distance, 1e-12)[:, None],
@@ -174,7 +180,7 @@ class Anatomy:
         left = np.hypot(x, y) / (self.inner_radius + thickness)
         middle, half = self._right_atrium()
         right = np.hypot((x - middle) / (half + thickness), y / (self.radius + thickness))
-        return np.hypot(np.stack([left, right]), z / height)
+        return np.cbrt(np.stack([left, right]) ** 3 + np.abs(z / height) ** 3)
 
 
 def chest_wall_depth(heart: Heart, plane: Plane, start: float) -> float:

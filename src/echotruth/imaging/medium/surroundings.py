@@ -18,6 +18,8 @@ from echotruth.imaging.medium.anatomy import (
     CAVITIES,
     FOLLOWING_BASE,
     LUNG_FADING_DB,
+    POSTERIOR_FADING_DB,
+    POSTERIOR_NARROWNESS,
     RIGHT_SHORTENING,
     WALLS,
     Anatomy,
@@ -55,7 +57,7 @@ class SurroundingsMotion:
     wall is at rest.
 
     What moves rigidly before the probe is the heart with all that lies as deep or deeper. Above it this motion falls in
-    proportion to the range, to 0 at the array; the chest wall has none.
+    proportion to the range, to 0 at the array.
 
     Parameters
     ----------
@@ -73,7 +75,7 @@ class SurroundingsMotion:
     ) -> None:
         self._heart, self._position, self._at_rest = heart, position, decay_length == 0
         if heart.rigid is not None:
-            self._rigid_share = self._depth_share(heart.rigid.centre, tissue)
+            self._rigid_share = self._depth_share(heart.rigid.centre)
         if self._at_rest:
             return
         from scipy.spatial import cKDTree  # takes 50 ms, and few views have surroundings
@@ -103,13 +105,10 @@ class SurroundingsMotion:
         inward[atrial | at_rest] = 0
         return share[:, None], inward
 
-    def _depth_share(self, array: Floats, tissue: NDArray[np.uint8] | None) -> Floats:
+    def _depth_share(self, array: Floats) -> Floats:
         """Share (n, 1) of the rigid motion before an array, whose middle is given, (3,), m."""
         nearest = np.linalg.norm(self._heart.positions(0) - array, axis=1).min()
-        share = np.minimum(np.linalg.norm(self._position - array, axis=1) / nearest, 1.0)
-        if tissue is not None:
-            share[tissue == TissueLabel.CHEST_WALL] = 0
-        return share[:, None]
+        return np.minimum(np.linalg.norm(self._position - array, axis=1) / nearest, 1.0)[:, None]
 
     def __call__(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m."""
@@ -273,6 +272,7 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
     anatomy = Anatomy(heart)
     place = anatomy.place(position)
     _set_lung(config, plane, (tissue, level), place, anatomy.radius)
+    _set_posterior(config, plane, (tissue, level), anatomy, position)
     if realism.neighbours.chambers_dB is not None:
         chambers = anatomy.chambers(position, place)
         cavity = np.isin(chambers, CAVITIES)
@@ -289,18 +289,38 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
 
 
 def _set_lung(config: Config, plane: Plane, of: tuple[NDArray[np.uint8], Floats], place: Place, radius: float) -> None:
-    """Set tissue (n,) and level (n,), dB, where there is lung: behind the free wall as the probe sees it.
+    """Set tissue (n,) and level (n,), dB, where there is lung: behind the free walls as the probe sees them.
 
-    It is mixed with the connective tissue where the free wall looks sideways.
+    It is mixed with the connective tissue where a free wall looks sideways.
     """
     lung_dB = config.realism.neighbours.lung_dB
     if lung_dB is None:
         return
     tissue, level = of
-    behind = np.clip(LUNG_SIDE + place.outward @ plane.axes[1], 0, 1) * (place.gap == 0)
-    lung = 10 ** ((lung_dB - LUNG_FADING_DB * place.distance / radius) / 10)
+    behind = np.clip(LUNG_SIDE + place.outward @ plane.axes[1], 0, 1)
+    lung = 10 ** ((lung_dB - LUNG_FADING_DB * np.maximum(place.distance - place.gap - place.wall, 0) / radius) / 10)
     power = behind * lung + (1 - behind) * 10 ** (level / 10)
     tissue[behind > LUNG_SHARE] = TissueLabel.LUNG
+    level[:] = 10 * np.log10(np.maximum(power, 1e-30))
+
+
+def _set_posterior(
+    config: Config, plane: Plane, of: tuple[NDArray[np.uint8], Floats], anatomy: Anatomy, position: Floats
+) -> None:
+    """Set tissue (n,) and level (n,), dB, at positions (n, 3), m, that lie behind the atria as the probe sees them.
+
+    It is mixed with what is there, less towards the sides.
+    """
+    posterior_dB = config.realism.neighbours.posterior_dB
+    if posterior_dB is None:
+        return
+    tissue, level = of
+    outward = position - anatomy.base
+    behind = np.clip(outward @ plane.axes[1] / np.maximum(np.linalg.norm(outward, axis=1), 1e-12), 0, 1)
+    fading = POSTERIOR_FADING_DB * anatomy.atrial_distance(position) / anatomy.radius
+    share = np.where(outward[:, 2] > 0, behind, 0) ** POSTERIOR_NARROWNESS
+    power = share * 10 ** ((posterior_dB - fading) / 10) + (1 - share) * 10 ** (level / 10)
+    tissue[share > 1 / 2] = TissueLabel.OTHER
     level[:] = 10 * np.log10(np.maximum(power, 1e-30))
 
 

@@ -87,15 +87,12 @@ class TissueImages:
         return (line < 0) | (line > len(scan.angle) - 1) | (range_ < begins)
 
     @cached_property
-    def _motions(self) -> tuple[Callable[[int], Floats], Callable[[int], Floats]]:
-        """Positions of the knots, (n, 3), m, if there is tissue of an atrium, and if there is any other that moves."""
+    def _motions(self) -> list[Callable[[int], Floats]]:
+        """Positions of the knots, (n, 3), m, if there is tissue of an atrium, the chest wall, or any other."""
         knots = self._in_heart_frame(*(np.linspace(at[0], at[-1], KNOTS) for at in (self._axial, self._lateral)))
         decay = self._config.realism.surroundings.si().motion_decay
-        kinds = (TissueLabel.LEFT_ATRIUM, TissueLabel.RIGHT_VENTRICLE)
-        atrial, other = (
-            SurroundingsMotion(self._heart, knots, decay, np.full(len(knots), kind, np.uint8)) for kind in kinds
-        )
-        return atrial, other
+        kinds = (TissueLabel.LEFT_ATRIUM, TissueLabel.CHEST_WALL, TissueLabel.RIGHT_VENTRICLE)
+        return [SurroundingsMotion(self._heart, knots, decay, np.full(len(knots), kind, np.uint8)) for kind in kinds]
 
     @cached_property
     def _layers(self) -> tuple[Labels, Labels, Labels]:
@@ -105,13 +102,12 @@ class TissueImages:
         return atria, chest, np.where(of_atria | of_chest, 0, self._at_ed).astype(np.uint8)
 
     def _around(self, frame: int) -> Labels:
-        atria, chest, rest = self._layers
-        atrial, other = self._motions
-        found = self._moved(rest, other, frame)
-        if atria.any():
-            moved = self._moved(atria, atrial, frame)
-            np.copyto(found, moved, where=moved > 0)
-        np.copyto(found, chest, where=chest > 0)
+        *over, rest = zip(self._layers, self._motions, strict=True)
+        found = self._moved(*rest, frame)
+        for labels, motion in over:
+            if labels.any():
+                moved = self._moved(labels, motion, frame)
+                np.copyto(found, moved, where=moved > 0)
         if self._config.realism.neighbours.chambers_dB is None:
             found[self._above_lid(frame)] = TissueLabel.OTHER
         found[self._hidden] = TissueLabel.OTHER

@@ -45,10 +45,12 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
     return np.column_stack([deeper, amplitude])[deeper < depth - h.max_source_range]
 
 
-def reverberation_filter(echoes: np.ndarray, frequency: np.ndarray, sound_speed: float) -> np.ndarray:
-    """Transfer function sum_n A_n exp(-2 pi i f 2 d_n / c) of later echoes (echoes, 2) of depth d and amplitude A.
+def reverberation_filter(echoes: np.ndarray, probe: Probe, frequency: np.ndarray) -> np.ndarray:
+    """Transfer function sum_n A_n exp(-2 (2 pi i / c + alpha) f d_n) of later echoes (echoes, 2): depth d, amplitude A.
 
-    The first echo is not in it. At frequencies (bins,), Hz: shape (bins,), complex.
+    They go the additional way through tissue that attenuates by alpha as all tissue does. The first echo is not in it.
+    At frequencies (bins,), Hz: shape (bins,), complex.
     """
-    cycles = np.multiply.outer(frequency, 2 * echoes[:, 0] / sound_speed)
-    return (np.exp(-2j * pi * cycles) * echoes[:, 1]).sum(axis=1)
+    p = probe.si()
+    way = np.multiply.outer(frequency, 2 * echoes[:, 0])
+    return (np.exp(-(2j * np.pi / p.sound_speed + p.attenuation) * way) * echoes[:, 1]).sum(axis=1)
