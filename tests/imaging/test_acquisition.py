@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scenes import medium, random, scene
 
-from echotruth.config import Config
+from echotruth.config import Config, Probe
 from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner
@@ -106,13 +106,20 @@ def test_a_later_echo_is_the_first_one_shifted(scanner):
     matrix, samples = scanner.matrix, 300
     deeper = samples / matrix.sampling * 1540 / 2
     echo = matrix(np.array([[0.4e-3, 3e-3, 0.0]]), np.ones(1))
-    later = reverberation_filter(np.array([[deeper, 0.25]]), matrix.frequency, 1540.0)[:, None, None] * echo
+    later = reverberation_filter(np.array([[deeper, 0.25]]), Probe(), matrix.frequency)[:, None, None] * echo
     traces = []
     for spectra in (echo, later):
         whole = np.zeros((matrix.samples // 2 + 1, 16, 16), complex)
         whole[matrix.first_bin : matrix.first_bin + len(matrix.frequency)] = spectra
         traces.append(np.fft.irfft(whole, matrix.samples, axis=0))
     assert np.abs(traces[1] - 0.25 * np.roll(traces[0], samples, axis=0)).max() < 1e-6 * np.abs(traces[0]).max()
+
+
+def test_a_later_echo_is_attenuated_on_its_way():
+    frequency, probe = np.array([20e6, 30e6]), Probe(attenuation_dB_per_cm_MHz=0.5)
+    lossless, lossy = (reverberation_filter(np.array([[2e-3, 0.1]]), of, frequency) for of in (Probe(), probe))
+    # There and back 0.4 cm of 0.5 dB/cm/MHz.
+    np.testing.assert_allclose(20 * np.log10(np.abs(lossy / lossless)), [-4.0, -6.0], rtol=1e-6)
 
 
 def test_only_near_echoes_are_repeated(acquire):

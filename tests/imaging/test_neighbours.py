@@ -14,9 +14,16 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.filling import emptied, opening, volumes
 from echotruth.imaging.medium.mitral_valve import Leaflets
 from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles
-from echotruth.imaging.medium.surroundings import Surroundings
+from echotruth.imaging.medium.surroundings import Surroundings, tissues
 
-LEVELS = {"chambers_dB": 0.0, "lung_dB": 2.0, "chest_wall_dB": 3.0, "leaflets_dB": 4.0, "papillary_muscles_dB": 0.0}
+LEVELS = {
+    "chambers_dB": 0.0,
+    "lung_dB": 2.0,
+    "posterior_dB": 5.0,
+    "chest_wall_dB": 3.0,
+    "leaflets_dB": 4.0,
+    "papillary_muscles_dB": 0.0,
+}
 REALISM = {"blood": {"level_dB": -25.0}, "surroundings": {"level_dB": -20.0, "density": 0.3}, "neighbours": LEVELS}
 CONFIG = Config.model_validate({"phantom": {"density_per_mm3": 1500.0}, "realism": REALISM})
 EJECTED = np.array([0.0, 0.0, 0.5, 1.0, 1.0, 0.6, 0.2, 0.1])
@@ -84,6 +91,16 @@ def test_walls_of_chambers_have_their_level(at):
     assert 10 * np.log10(ratio) == pytest.approx(20, abs=4)
 
 
+def test_what_lies_behind_the_atria_is_brightest_at_their_roof(heart):
+    view = scene(CONFIG, heart, "long_axis")
+    anatomy, beyond = Anatomy(heart), np.array([0.1, 1.0, 2.0])
+    above = anatomy.base + np.outer(anatomy.roof - anatomy.base[2] + (0.08 + beyond) * anatomy.radius, [0, 0, 1.0])
+    beside = anatomy.base + np.outer(anatomy.radius * (1.5 + beyond), [-1.0, 0, 0.3])
+    level = 10 * np.log10(tissues(CONFIG, heart, view.plane, np.concatenate([above, beside]))[1])
+    np.testing.assert_allclose(level[:3], 5 - 20 * beyond, atol=0.6)
+    assert (level[3:] < -10).all()
+
+
 def test_the_medium_has_nothing_of_them_in_the_wall_nor_in_the_cavity(heart, at):
     (whole, seeded), plane = medium(at), at.plane
     around = Surroundings.restored(at, seeded)
@@ -115,8 +132,8 @@ def test_the_free_wall_moves_inwards_and_the_chest_wall_stays(heart):
     free = (around.tissue == TissueLabel.RIGHT_FREE_WALL) & (np.abs(start[:, 1] - 6.5e-3) < 0.5e-3)
     free &= start[:, 0] < -2.6e-3
     septum, height = 0.2 * 2.33e-3, (3.4 / 7.6) / 0.85
-    # Two fifths of its width, which falls from 0.75 of 2.5 mm at the base, besides the motion of the septum.
-    expected = septum + 0.4 * 0.75 * 2.5e-3 * (1 - height**2)
+    # Two fifths of its width, which falls from 2.5 mm at the base, besides the motion of the septum.
+    expected = septum + 0.4 * 2.5e-3 * (1 - height**3)
     assert free.sum() > 20 and (end - start)[free, 0].mean() == pytest.approx(expected, rel=0.1)
     chest = around.tissue == TissueLabel.CHEST_WALL
     assert chest.sum() > 100 and np.array_equal(start[chest], end[chest])

@@ -300,7 +300,8 @@ VIEWS: dict[str, dict[str, View]] = {
 }
 """Views of each `views.preset`: the paper's, and those of an echo, whose long axes go through the middles of AHA
 segments in the usual display - the inferoseptal, the inferior and the inferolateral wall at the left - so that together
-they show all of a bullseye; turned a little, by eye, as the axis of a heart is seldom that of the beam. The basal plane is low enough for the base not to pass it as it descends."""
+they show all of a bullseye; turned a little, by eye, as the axis of a heart is seldom that of the beam. The basal
+plane is low enough for the base not to pass it as it descends."""
 
 
 def named_views(value: Any) -> Any:
