@@ -84,6 +84,9 @@ DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
 REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
 over those of the array."""
+REALISM_HARMONIC = {"human": 1.25}
+"""`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
+its half. Presets that are not here have no harmonic imaging."""
 REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, float] = {
@@ -152,12 +155,23 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     if name not in REALISM_BANDWIDTHS:
         return {}
     width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
-    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)}
+    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, name)
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
-    share, density = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3"
-    bandwidth = round(share * ARRAY_PRESETS[array]["bandwidth"], 3)
-    return found | {"probe.bandwidth": bandwidth, density: round(share * ARRAY_DEFAULTS[array][density], 3)}
+    share, density, ratio = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3", 1.0
+    if "probe.frequency_MHz" in found and _value(values, "probe.frequency_MHz") is None:
+        ratio = REALISM_HARMONIC[name]
+    # A resolution cell is so many wavelengths long, wide and thick.
+    number = round(share * ratio**3 * ARRAY_DEFAULTS[array][density], 3)
+    return found | {"probe.bandwidth": round(share * ARRAY_PRESETS[array]["bandwidth"], 3), density: number}
+
+
+def _harmonic(values: dict[str, Any], array: str, realism: str) -> dict[str, Any]:
+    """Defaults of dotted keys of harmonic imaging, unless it is not that of a preset, or is turned off."""
+    if realism not in REALISM_HARMONIC or array not in ARRAY_PRESETS or _value(values, "rf.harmonic") is False:
+        return {}
+    frequency = round(REALISM_HARMONIC[realism] * ARRAY_PRESETS[array]["frequency_MHz"], 3)
+    return {"rf.harmonic": True, "rf.transmit_apodization": "none", "probe.frequency_MHz": frequency}
 
 
 def _with_lengths(values: dict[str, Any]) -> dict[str, Any]:

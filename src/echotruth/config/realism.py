@@ -103,6 +103,17 @@ class Haze(Section):
     """Mean additional range of the repeated echoes, which is exponentially distributed."""
 
 
+class Aberration(Section):
+    """Aberration: tissue near the array delays what each element sends and receives. It is the same in all frames of a
+    view; the beam is wider and has higher side lobes."""
+
+    delay_ns: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 0.0
+    """Root mean square of the delay on each way; 0 for no aberration. The human chest wall has 21 ns (Hinkelman, Szabo
+    & Waag 1997)."""
+    correlation_length_mm: Annotated[FiniteFloat, Field(ge=0.01, le=1000)] = 2.5
+    """Full width at half maximum of the Gaussian correlation of the delay along the array; 2.5 mm there."""
+
+
 class Shadow(Section):
     """Acoustic shadow of a rib, which blocks part of the array."""
 
@@ -170,7 +181,7 @@ def _preset(scale: float, times_ms: tuple[float, float]) -> dict[str, Any]:
 REALISM_PRESETS: dict[str, dict[str, Any]] = {
     "none": {},
     "mouse": _preset(1.0, (500.0, 14.0)),
-    "human": _preset(12.5, (350.0, 98.0)),
+    "human": _preset(12.5, (350.0, 98.0)) | {"aberration": {"delay_ns": 21.3, "correlation_length_mm": 2.5}},
 }
 """Values of keys of each `realism.preset`; docs/realism.md says what they were fitted to."""
 
@@ -181,7 +192,8 @@ class Realism(Section):
     preset: Literal["none", "mouse", "human"] = "none"
     """Levels, lengths and times of the keys below that are not given: as in clips of such hearts, or all off. With
     `mouse` and `human` the defaults of `probe.bandwidth`, `phantom.density_per_mm3` and of gain, smoothing and grey map
-    in `bmode` change too, but not where `cases` change this key from heart to heart."""
+    in `bmode` change too, and with `human` those of `probe.frequency_MHz`, `rf.harmonic` and `rf.transmit_apodization`,
+    but not where `cases` change this key from heart to heart."""
     backscatter: Backscatter = Backscatter()
     """Echo of muscle that depends on its fibres; its mean over all directions at end-diastole stays what it was."""
     borders: Borders = Borders()
@@ -198,6 +210,8 @@ class Realism(Section):
     """Noise of the receiver."""
     haze: Haze = Haze()
     """Reverberation: near echoes are repeated later and out of focus."""
+    aberration: Aberration = Aberration()
+    """Aberration by tissue near the array."""
     shadow: Shadow = Shadow()
     """Acoustic shadow of a rib, which blocks part of the array."""
 
