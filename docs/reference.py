@@ -90,9 +90,9 @@ This page is generated from `src/echotruth/repository/arrays.csv` by `make refer
 _RF = """`lines` are rounded to 16 bits of the largest. The group has `channels` and `channels_step` if `rf.keep` names
 channels. Its attributes are, in SI units, sampling_frequency (of the channels), demodulation_frequency (of the lines),
 sound_speed, centre_frequency, bandwidth, element_width, element_height, elevation_focus, attenuation (nepers per metre
-and hertz); transmit, scan, apodization and f_number, as in the section `rf`; foci (ranges of the foci of focused
-transmits; transmit number `zone` x lines + `line` belongs to that line and zone); and accuracy (largest
-error of the RF relative to the exact sum).
+and hertz); transmit, scan, apodization, transmit_apodization, harmonic and f_number, as in the section `rf`; foci
+(ranges of the foci of focused transmits; transmit number `zone` x lines + `line` belongs to that line and zone); and
+accuracy (largest error of the RF relative to the exact sum).
 """
 
 _DERIVED = """What follows from the stored arrays is not stored. `echotruth.kinematics(heart)` gives the arrays

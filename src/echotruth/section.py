@@ -28,6 +28,7 @@ from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
 UNITS: dict[str, float] = {
     "um": 1e-6,
+    "ns": 1e-9,
     "mm": 1e-3,
     "per_mm3": 1e9,
     "dB_per_cm_MHz": log(10) / 20 / 1e-2 / 1e6,  # nepers per metre and hertz

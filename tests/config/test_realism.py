@@ -46,9 +46,12 @@ def test_realistic_configuration_is_ideal_without_one_key(name):
     species = realistic.realism.preset
     assert off == configure(geometry={"preset": species}, views=off.views, name=name) and off.realism == Realism()
     assert realistic.probe.bandwidth < off.probe.bandwidth
-    # A longer pulse, and as many scatterers in it.
-    density = realistic.phantom.density_per_mm3 / off.phantom.density_per_mm3
-    assert density == pytest.approx(realistic.probe.bandwidth / off.probe.bandwidth)
+    # A longer pulse, and as many scatterers in it and across the beam.
+    density, frequency = (
+        getattr(realistic, section).si().__dict__[key] / getattr(off, section).si().__dict__[key]
+        for section, key in (("phantom", "density"), ("probe", "frequency"))
+    )
+    assert density == pytest.approx(realistic.probe.bandwidth / off.probe.bandwidth * frequency**3, rel=1e-3)
 
 
 def test_preset_of_realism_fills_in_all_keys_but_those_that_are_given():

@@ -84,6 +84,9 @@ DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
 REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
 over those of the array."""
+REALISM_HARMONIC = {"human": 1.25}
+"""`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
+its half. Presets that are not here have no harmonic imaging."""
 REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, Any] = {
@@ -95,21 +98,18 @@ REALISM_IMAGE: dict[str, Any] = {
     "bmode.dropout.edge_loss_dB": 14.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_SCAN: dict[str, dict[str, Any]] = {
-    "mouse": {
-        "bmode.time_gain.range_mm": [1.2, 2.0, 2.8, 3.6, 6.0, 9.0, 12.0, 15.0],
-        "bmode.time_gain.gain_dB": [8.0, 5.0, 3.0, 0.0, 1.5, 4.0, 7.0, 9.0],
-    },
-    "human": {
-        "rf.focus_mm": 76.0,
-        "rf.sector_deg": 85.0,
-        "bmode.field_of_view_mm": 180.0,
-        "bmode.time_gain.range_mm": [15.0, 25.0, 50.0, 75.0, 100.0, 125.0, 150.0, 190.0],
-        "bmode.time_gain.gain_dB": [8.0, 3.0, 0.0, 2.0, 6.0, 10.0, 13.0, 15.0],
-    },
+REALISM_SCAN: dict[str, dict[str, float]] = {
+    "mouse": {},
+    "human": {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
 }
-"""`realism.preset` -> default of dotted keys: gain over range by which tissue is as bright at any range, as measured in
-an even medium before the default array; and a scan that shows the roof of the atria."""
+"""`realism.preset` -> dotted keys whose defaults are so many times those of the array, so that the roof of the atria is
+seen."""
+REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
+    "mouse": {0.1: 8, 0.17: 5, 0.23: 3, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
+    "human": {0.1: 8, 0.17: 3, 0.33: 0, 0.5: 2, 0.67: 6, 0.83: 10, 1.0: 13, 1.27: 15},
+}
+"""`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: an even medium is as
+bright at any range of the default array with it."""
 
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""
@@ -169,12 +169,37 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     if name not in REALISM_BANDWIDTHS:
         return {}
     width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
-    found = REALISM_IMAGE | REALISM_SCAN[name] | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)}
+    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, name)
+    found |= _scan(array, name)
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
-    share, density = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3"
-    bandwidth = round(share * ARRAY_PRESETS[array]["bandwidth"], 3)
-    return found | {"probe.bandwidth": bandwidth, density: round(share * ARRAY_DEFAULTS[array][density], 3)}
+    share, density, ratio = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3", 1.0
+    if "probe.frequency_MHz" in found and _value(values, "probe.frequency_MHz") is None:
+        ratio = REALISM_HARMONIC[name]
+    # A resolution cell is so many wavelengths long, wide and thick.
+    number = round(share * ratio**3 * ARRAY_DEFAULTS[array][density], 3)
+    return found | {"probe.bandwidth": round(share * ARRAY_PRESETS[array]["bandwidth"], 3), density: number}
+
+
+def _scan(array: str, realism: str) -> dict[str, Any]:
+    """Defaults of dotted keys of a scan that shows what a preset has, and of its gain over range."""
+    if array not in ARRAY_DEFAULTS:
+        return {}
+    default, gain = ARRAY_DEFAULTS[array], REALISM_TIME_GAIN_DB[realism]
+    scan = {key: round(share * default[key], 3) for key, share in REALISM_SCAN[realism].items()}
+    ranges = [round(share * default["bmode.field_of_view_mm"], 3) for share in gain]
+    return scan | {
+        "bmode.time_gain.range_mm": ranges,
+        "bmode.time_gain.gain_dB": [float(each) for each in gain.values()],
+    }
+
+
+def _harmonic(values: dict[str, Any], array: str, realism: str) -> dict[str, Any]:
+    """Defaults of dotted keys of harmonic imaging, unless it is not that of a preset, or is turned off."""
+    if realism not in REALISM_HARMONIC or array not in ARRAY_PRESETS or _value(values, "rf.harmonic") is False:
+        return {}
+    frequency = round(REALISM_HARMONIC[realism] * ARRAY_PRESETS[array]["frequency_MHz"], 3)
+    return {"rf.harmonic": True, "rf.transmit_apodization": "none", "probe.frequency_MHz": frequency}
 
 
 def _with_lengths(values: dict[str, Any]) -> dict[str, Any]:

@@ -157,6 +157,13 @@ class Rf(Section):
     subtends the angle of the sector."""
     apodization: Literal["hann", "none"] = "hann"
     """Apodization on receive and, if focused or synthetic aperture, on transmit."""
+    transmit_apodization: Literal["hann", "none"] | None = None
+    """Focused, synthetic aperture: apodization on transmit. Default: `apodization`, and `none` with `realism.preset:
+    human`, as side lobes of a harmonic are low."""
+    harmonic: bool = False
+    """Harmonic imaging: echoes are those of the second harmonic of a wave, which is sent at half of
+    `probe.frequency_MHz`. A focused beam is the square of that wave's, narrower and with lower side lobes, and echoes
+    grow in proportion to range up to `focus_mm`. Default: true with `realism.preset: human`."""
     f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
     """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range. Default: 2 for
     `mouse_linear_40MHz`."""

@@ -105,6 +105,17 @@ class Haze(Section):
     """Mean additional range of the repeated echoes, which is exponentially distributed."""
 
 
+class Aberration(Section):
+    """Aberration: tissue near the array delays what each element sends and receives. It is the same in all frames of a
+    view; the beam is wider and has higher side lobes."""
+
+    delay_ns: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 0.0
+    """Root mean square of the delay on each way; 0 for no aberration. The human chest wall has 21 ns (Hinkelman, Szabo
+    & Waag 1997)."""
+    correlation_length_mm: Annotated[FiniteFloat, Field(ge=0.01, le=1000)] = 2.5
+    """Full width at half maximum of the Gaussian correlation of the delay along the array; 2.5 mm there."""
+
+
 class Shadow(Section):
     """Acoustic shadow of a rib, which blocks part of the array."""
 
@@ -181,6 +192,7 @@ REALISM_PRESETS: dict[str, dict[str, Any]] = {
         {
             "backscatter": {"fibre_strain_dB": 10.0},
             "noise": {"snr_dB": 75.0},
+            "aberration": {"delay_ns": 21.3, "correlation_length_mm": 2.5},
             "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -4.0},
         },
     ),
@@ -194,7 +206,8 @@ class Realism(Section):
     preset: Literal["none", "mouse", "human"] = "none"
     """Levels, lengths and times of the keys below that are not given: as in clips of such hearts, or all off. With
     `mouse` and `human` the defaults of `probe.bandwidth`, `probe.attenuation_dB_per_cm_MHz`, `phantom.density_per_mm3`
-    and of gain, edges, smoothing and grey map in `bmode` change too, with `human` also those of focus, sector and depth,
+    and of gain, edges, smoothing and grey map in `bmode` change too, and with `human` those of `probe.frequency_MHz`,
+    `rf.harmonic`, `rf.transmit_apodization`, `rf.focus_mm`, `rf.sector_deg` and `bmode.field_of_view_mm`,
     but not where `cases` change this key from heart to heart."""
     backscatter: Backscatter = Backscatter()
     """Echo of muscle that depends on its fibres; its mean over all directions at end-diastole stays what it was."""
@@ -212,6 +225,8 @@ class Realism(Section):
     """Noise of the receiver."""
     haze: Haze = Haze()
     """Reverberation: near echoes are repeated later and out of focus."""
+    aberration: Aberration = Aberration()
+    """Aberration by tissue near the array."""
     shadow: Shadow = Shadow()
     """Acoustic shadow of a rib, which blocks part of the array."""
 

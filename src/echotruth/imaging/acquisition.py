@@ -1,4 +1,4 @@
-"""Acquisition: the full matrix of every frame, with acoustic shadow, reverberation haze and noise.
+"""Acquisition: the full matrix of every frame, with growth of the harmonic, shadow, haze, aberration and noise.
 
 Applied to the full matrix, so that every synthesised transmit contains them.
 """
@@ -8,10 +8,12 @@ from math import sqrt
 import numpy as np
 
 from echotruth.config import Config
+from echotruth.imaging.beamforming.aperture import Aperture, harmonic
 from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner, validate_scatterers
 from echotruth.imaging.medium.medium import Medium
 from echotruth.imaging.medium.random_process import Random
+from echotruth.imaging.rf.aberration import delays, phasors
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
 
@@ -37,6 +39,8 @@ class Acquisition:
         realism = config.realism
         self._scanner, self._medium, self._random = scanner, medium, random
         self._haze_range, self._filter, self._matrix = 0.0, None, scanner.matrix
+        self._growth_range = config.rf.si().focus if config.rf.harmonic else 0.0
+        self._screen = _screen(config, scanner.matrix.frequency, random) if realism.aberration.delay_ns else ()
         if realism.haze.level_dB is not None:
             echoes = reverberation(realism.haze, config.probe, imaging_depth(config.rf, config.bmode), random("haze"))
             self._haze_range = realism.haze.si().max_source_range
@@ -55,10 +59,24 @@ class Acquisition:
 
     def echoes(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
         """Record of scatterers, their positions (n, 3), m, amplitudes (n,) and exponents (n,), without noise."""
+        amplitude = self._grown(position, amplitude)
         if self._filter is None:
-            return self._matrix(position, amplitude, exponent)
+            return self._aberrated(self._matrix(position, amplitude, exponent))
         near = np.linalg.norm(position, axis=1) < self._haze_range
-        return self._matrix(position, amplitude, exponent, (near, self._filter))
+        return self._aberrated(self._matrix(position, amplitude, exponent, (near, self._filter)))
+
+    def _grown(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+        """Amplitudes (n,) of scatterers (n, 3), m, times what there is of the harmonic, relative to the focus."""
+        if not self._growth_range:
+            return amplitude
+        # Of a plane wave whose attenuation is proportional to frequency: its loss is that of a wave sent as harmonic.
+        return amplitude * np.minimum(np.linalg.norm(position, axis=1) / self._growth_range, 1)
+
+    def _aberrated(self, matrix: np.ndarray) -> np.ndarray:
+        """The record (bins, receivers, transmitters) after the screen, which overwrites it."""
+        for factor in self._screen:
+            matrix *= factor
+        return matrix
 
     def unit_noise(self, frame: int) -> np.ndarray:
         """Noise of variance 1 in the records of all pairs in a frame, at the frequencies of the matrix.
@@ -76,5 +94,21 @@ class Acquisition:
         muscle = self._medium.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
         if not muscle.any():
             raise ValueError("There is no muscle in the image at end-diastole, so realism.noise.snr_dB has no meaning.")
-        echo, noise = scanner.lines(*self._medium.wall(0)), scanner.beamform(self.unit_noise(0))
+        position, amplitude, exponent = validate_scatterers(*self._medium.wall(0))
+        matrix = scanner.matrix(position, self._grown(position, amplitude), exponent)
+        echo, noise = scanner.beamform(self._aberrated(matrix)), scanner.beamform(self.unit_noise(0))
         return float(np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle]))
+
+
+def _screen(config: Config, frequency: np.ndarray, random: Random) -> tuple[np.ndarray, np.ndarray]:
+    """Factors of a record on receive, (bins, elements, 1), and on transmit, (bins, 1, elements).
+
+    The frequencies (bins,) are in Hz. A harmonic comes from a wave of half the frequency, of which the beam is squared after the screen.
+    """
+    delay = delays(config.realism.aberration, config.probe, random("aberration"))
+    received = phasors(delay, frequency)
+    sent = received
+    if config.rf.harmonic:
+        weight = Aperture(config.probe, config.rf).fundamental
+        sent = harmonic(weight * phasors(delay, frequency / 2)) / harmonic(weight[None])
+    return received[:, :, None].astype(np.complex64), sent[:, None, :].astype(np.complex64)

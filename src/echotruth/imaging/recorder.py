@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from echotruth.config import Config
+from echotruth.imaging.beamforming.aperture import sent_apodization
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
@@ -149,6 +150,8 @@ def _settings(config: Config) -> dict[str, Any]:
         "transmit": rf.transmit,
         "scan": rf.scan,
         "apodization": rf.apodization,
+        "transmit_apodization": sent_apodization(rf),
+        "harmonic": rf.harmonic,
         "f_number": rf.f_number,
         "accuracy": LENS_ACCURACY if rf.elevation_beam else PLANE_ACCURACY,
     }

@@ -42,13 +42,14 @@ class Aperture:
     centres : ndarray (elements,)
         Lateral coordinates of the elements, m.
     tapered : bool
-        Whether the weights are those of a Hann window, or all 1.
+        Whether the weights on receive are those of a Hann window, or all 1.
     """
 
     def __init__(self, probe: Probe, rf: Rf):
         pitch = probe.si().pitch
         self.centres = element_centres(probe)
-        self.tapered = rf.apodization == "hann"
+        self.tapered, self._sends_tapered = (each == "hann" for each in (rf.apodization, sent_apodization(rf)))
+        self._harmonic = rf.harmonic
         self._length, self._min_width, self._f_number = probe.elements * pitch, MIN_WIDTH * pitch, rf.f_number
 
     def centre_and_width(self, line_origin: np.ndarray, range_: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
@@ -61,8 +62,47 @@ class Aperture:
         return np.clip(line_origin, -limit, limit), width
 
     def weights(self, line_origin: np.ndarray, range_: float) -> np.ndarray:
-        """Weights (lines, elements), 1, for points at one range (m) on lines with origins (lines,), m."""
+        """Weights on receive (lines, elements), 1, for points at one range (m) on lines with origins (lines,), m."""
+        return self._window(line_origin, range_, self.tapered)
+
+    def sent_weights(self, line_origin: np.ndarray, range_: float) -> np.ndarray:
+        """Weights on transmit of beams that are focused there, as :meth:`weights`; of their harmonic if that is used."""
+        weights = self._window(line_origin, range_, self._sends_tapered)
+        return harmonic(weights) if self._harmonic else weights
+
+    @property
+    def fundamental(self) -> np.ndarray:
+        """Weights of all elements, (elements,), 1, in a wave that is sent by the whole array."""
+        return self._window(np.zeros(1), np.inf, self._sends_tapered)[0]
+
+    def _window(self, line_origin: np.ndarray, range_: float, tapered: bool) -> np.ndarray:
         centre, width = self.centre_and_width(line_origin, range_)
         offset = (self.centres - centre[:, None]) / width[:, None]
         inside = np.abs(offset) <= 0.5
-        return np.where(inside, np.cos(np.pi * offset) ** 2 if self.tapered else 1.0, 0.0)
+        return np.where(inside, np.cos(np.pi * offset) ** 2 if tapered else 1.0, 0.0)
+
+
+def sent_apodization(rf: Rf) -> str:
+    """Apodization of the wave that is sent."""
+    return rf.transmit_apodization or rf.apodization
+
+
+def harmonic(weights: np.ndarray) -> np.ndarray:
+    """Weights of an array whose beam is the square of that of an array of half the frequency.
+
+    Where a wave is in focus, its field across the beam is the Fourier transform of the weights w of the array, and the
+    second harmonic, which is made by the square of the pressure, has the square of that: the transform of w * w, which
+    at twice the frequency is that of an array of the same length. Off the focus the square has a phase, k (u - v)^2 / 8
+    (1 / range - 1 / focus) for each pair of elements u, v and the wavenumber k of the harmonic, that is left out.
+
+    Parameters
+    ----------
+    weights : ndarray of shape (n, elements)
+        Of the wave that is sent, real or complex.
+
+    Returns
+    -------
+    ndarray of shape (n, elements)
+        Sums over all pairs whose middle is at an element.
+    """
+    return np.stack([np.convolve(each, each)[::2] for each in weights])

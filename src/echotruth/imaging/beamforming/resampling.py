@@ -113,8 +113,9 @@ def line_resampling(probe: Probe, rf: Rf, scan: Scan, transmits: Transmits, dept
     if isinstance(scan, Linear):
         return Resampling(scan.line_origin, np.zeros(1), np.ones(1), len(scan.line_origin))
     p, frequency = probe.si(), np.linspace(*pulse_band(probe), FREQUENCIES)
-    received = Aperture(probe, rf).weights(np.zeros(1), np.inf)[0]
-    both = np.convolve(received, sent_from(transmits, scan, depth, p.pitch) if not len(transmits.foci) else received)
+    aperture, whole = Aperture(probe, rf), (np.zeros(1), np.inf)
+    sent = aperture.sent_weights(*whole)[0] if len(transmits.foci) else sent_from(transmits, scan, depth, p.pitch)
+    both = np.convolve(aperture.weights(*whole)[0], sent)
     position = (np.arange(len(both)) - (len(both) - 1) / 2) * p.pitch
     rate = np.outer(frequency / p.sound_speed, position).ravel()
     power = np.outer(pulse_spectrum(probe, frequency), both).ravel() ** 2

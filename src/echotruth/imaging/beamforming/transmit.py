@@ -94,7 +94,7 @@ def focused_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     aperture, values = Aperture(probe, rf), rf.si()
     foci = values.focus + (np.arange(rf.focal_zones) - (rf.focal_zones - 1) / 2) * values.focal_spacing
     delay = np.concatenate([_advance(aperture.centres, scan, focus) for focus in foci]) / probe.si().sound_speed
-    weight = np.concatenate([aperture.weights(scan.line_origin, focus) for focus in foci])
+    weight = np.concatenate([aperture.sent_weights(scan.line_origin, focus) for focus in foci])
     origin = np.tile(np.stack([scan.line_origin, np.zeros(len(scan.line_origin))], axis=1), (len(foci), 1))
     return Transmits(delay, weight, origin, np.zeros(len(origin)), foci=foci)
 
@@ -126,8 +126,8 @@ def diverging_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
 
 def synthetic_aperture(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     """Each element alone, with its weight in the whole aperture (Jensen 2006, Ultrasonics 44:e5)."""
-    aperture = Aperture(probe, rf.model_copy(update={"f_number": 0.0}))
-    weight = np.diag(aperture.weights(np.zeros(1), 1.0)[0])
+    aperture = Aperture(probe, rf.model_copy(update={"f_number": 0.0, "harmonic": False}))
+    weight = np.diag(aperture.sent_weights(np.zeros(1), 1.0)[0])
     origin = np.stack([aperture.centres, np.zeros(len(weight))], axis=1)
     return Transmits(np.zeros(weight.shape), weight, origin, np.zeros(len(weight)))
 
