@@ -87,15 +87,15 @@ over those of the array."""
 REALISM_HARMONIC = {"human": 1.25}
 """`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
 its half. Presets that are not here have no harmonic imaging."""
-REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 250}
+REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 130}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, Any] = {
     "probe.attenuation_dB_per_cm_MHz": 0.5,
     "bmode.dynamic_range_dB": 50.0,
-    "bmode.gain_dB": -14.0,
+    "bmode.gain_dB": -12.0,
     "bmode.grey_gamma": 1.3,
-    "bmode.smoothing": 0.65,
-    "bmode.dropout.edge_loss_dB": 14.0,
+    "bmode.smoothing": 0.7,
+    "bmode.dropout.edge_loss_dB": 12.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
@@ -106,7 +106,7 @@ REALISM_SCAN: dict[str, dict[str, float]] = {
 seen."""
 REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
     "mouse": {0.1: 8, 0.17: 5, 0.23: 3, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
-    "human": {0.1: 8, 0.17: 3, 0.33: 0, 0.5: 2, 0.67: 6, 0.83: 10, 1.0: 13, 1.27: 15},
+    "human": {0.1: 19, 0.17: 15, 0.23: 8, 0.3: 2, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
 }
 """`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: an even medium is as
 bright at any range of the default array with it."""

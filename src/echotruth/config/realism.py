@@ -168,7 +168,7 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
         },
         "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
         "decorrelation": {"time_ms": times_ms[0]},
-        "blood": {"level_dB": -24.0, "decorrelation_time_ms": times_ms[1]},
+        "blood": {"level_dB": -22.0, "decorrelation_time_ms": times_ms[1]},
         "surroundings": {"level_dB": -9.0, "start_mm": scale, "motion_decay_mm": scale},
         "neighbours": {
             "chambers_dB": 0.0,
@@ -178,20 +178,25 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
             "leaflets_dB": 12.0,
             "papillary_muscles_dB": 0.0,
         },
-        "haze": {"level_dB": -8.0, "max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
+        "haze": {"max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
     }
     return merged(preset, of_heart)
 
 
 REALISM_PRESETS: dict[str, dict[str, Any]] = {
     "none": {},
-    "mouse": _preset(1.0, (500.0, 14.0), {"backscatter": {"fibre_strain_dB": 30.0}, "noise": {"snr_dB": 60.0}}),
+    "mouse": _preset(
+        1.0,
+        (500.0, 14.0),
+        {"backscatter": {"fibre_strain_dB": 30.0}, "noise": {"snr_dB": 60.0}, "haze": {"level_dB": -8.0}},
+    ),
     "human": _preset(
         12.5,
         (350.0, 98.0),
         {
             "backscatter": {"fibre_strain_dB": 10.0},
             "noise": {"snr_dB": 75.0},
+            "haze": {"level_dB": -1.0},
             "aberration": {"delay_ns": 21.3, "correlation_length_mm": 2.5},
             "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -4.0},
         },
