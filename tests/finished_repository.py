@@ -53,6 +53,7 @@ OPTIONAL = (
     "epicardium",
     "surroundings",
     "leaflets",
+    "aortic_cusps",
     "papillary_muscles",
     "channels",
     "transmit",

@@ -11,10 +11,9 @@ from echotruth.fem.location import locate
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import Anatomy
 from echotruth.imaging.medium.blood import Cavity
-from echotruth.imaging.medium.filling import emptied, opening, volumes
-from echotruth.imaging.medium.mitral_valve import Leaflets
-from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles
+from echotruth.imaging.medium.filling import aortic_opening, emptied, opening, volumes
 from echotruth.imaging.medium.surroundings import Surroundings, tissues
+
 
 LEVELS = {
     "chambers_dB": 0.0,
@@ -147,51 +146,17 @@ def test_the_valve_is_open_while_the_cavity_fills(heart):
     open_ = opening(volume)
     assert (open_[[0, 1, 2, 3]] == 0).all() and (open_[[4, 5]] == 1).all() and 0 < open_[6] < 1
     assert (opening(np.full(8, 30e-9)) == 0).all()
+    # It empties by 8/25 in the two frames after the first two.
+    aortic = aortic_opening(volume)
+    assert (aortic[[1, 2]] == 1).all() and (aortic[[0, 3, 4, 5, 6]] == 0).all()
 
 
-def test_leaflets_meet_below_the_base_when_shut_and_point_into_the_cavity_when_open(heart):
-    along = np.zeros(4)
-    place = np.column_stack([along, [1, 1, -1, -1], [0, 1, 0, 1]])
-    leaflets = Leaflets(scene(CONFIG, heart), place, np.ones(4))
-    rim = heart.positions(0)[Cavity(heart.endo).rim]
-    shut, open_ = leaflets.in_heart(1), leaflets.in_heart(4)
-    radius = np.hypot(*rim[:, :2].T).mean()
-    assert shut[1, 0] == pytest.approx(shut[3, 0]) == pytest.approx(-radius / 3)
-    assert (shut[[1, 3], 2] < rim[:, 2].mean()).all()
-    np.testing.assert_allclose(shut[[0, 2], 0], [radius, -radius])
-    base = heart.positions(4)[Cavity(heart.endo).rim][:, 2].mean()
-    assert base - open_[1, 2] > 0.8 * (4 / 3) * 0.8 * radius
-    assert open_[1, 0] - open_[3, 0] > radius  # the way is free
-
-
-def test_papillary_muscles_have_their_level(heart):
-    muscles = PapillaryMuscles.seed(scene(CONFIG, heart))
-    assert len(muscles.amplitude) > 500
-    assert 10 * np.log10((muscles.amplitude**2).mean()) == pytest.approx(0.0, abs=0.8)
-    # As dense as muscle: in a box within the body.
-    one = muscles.position[muscles.muscle == 0]
-    box = (np.abs(one - one.mean(axis=0)) < 0.08e-3).all(axis=1).sum()
-    expected = CONFIG.phantom.si().density * 0.16e-3**3
-    assert abs(box - expected) < 4 * np.sqrt(expected)
-
-
-def test_leaflets_have_the_echo_of_their_area_when_the_rim_is_narrower_too(heart):
-    leaflets, probe = Leaflets.seed(scene(CONFIG, heart)), CONFIG.probe.si()
-    rims = (heart.positions(frame)[Cavity(heart.endo).rim] for frame in (0, 3))
-    # Strips in planes across the line on which both meet: together as long as the chord, 12 degrees below the base.
-    areas = [np.pi * np.hypot(*rim[:, :2].T).mean() ** 2 / np.cos(np.pi / 15) for rim in rims]
-    expected = areas[0] * (probe.frequency / probe.sound_speed) ** 2
-    assert abs(len(leaflets.place) - expected) < 4 * np.sqrt(expected)
-    before, narrowed = (leaflets.amplitudes(frame).sum() / area for frame, area in zip((0, 3), areas, strict=True))
-    assert areas[1] < 0.7 * areas[0] and narrowed == pytest.approx(before, rel=1e-6)
-
-
-def test_papillary_muscles_lie_in_the_cavity_and_ride_with_its_wall(heart):
-    muscles, cavity = PapillaryMuscles.seed(scene(CONFIG, heart)), Cavity(heart.endo)
-    assert (locate(cavity.positions(heart.positions(0)), cavity.cells, muscles.in_heart(0)).cell >= 0).all()
-    moved = muscles.in_heart(3) - muscles.in_heart(0)
-    assert np.ptp(moved[muscles.muscle == 1], axis=0).max() < 1e-12
-    # Towards the axis, by a fifth of its distance at the endocardium.
-    azimuth = 7 * np.pi / 4
-    inwards = -moved[muscles.muscle == 1].mean(axis=0)[:2] @ [np.cos(azimuth), np.sin(azimuth)]
-    assert inwards == pytest.approx(0.2 * 1.3e-3, rel=0.15)
+def test_the_mitral_valve_opens_twice_and_is_half_open_between():
+    """Filling in two waves, of which the second is half as fast, after an ejection of 12 frames."""
+    frame = np.arange(48)
+    wave = lambda middle, width: np.exp(-0.5 * ((frame - middle) / width) ** 2)  # noqa: E731
+    rate = -1.0 * wave(7, 3) + wave(22, 2.5) + 0.5 * wave(40, 2.5)
+    rate *= np.where(frame < 15, 1, -rate[:15].sum() / rate[15:].sum())
+    open_ = opening(100 + np.concatenate([[0], np.cumsum(rate)[:-1]]))
+    assert (open_[:16] == 0).all() and open_[22] == 1 and open_[40] > 0.8
+    assert 0.2 < open_[28:34].min() < 0.5 and (open_[46:] < 0.1).all()

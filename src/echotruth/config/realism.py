@@ -62,7 +62,7 @@ class Neighbours(Section):
     Levels are mean echo powers relative to muscle; null leaves a neighbour out."""
 
     chambers_dB: Level | None = None
-    """Walls of the right ventricle and of both atria, whose cavities have the level of `blood`."""
+    """Walls of the right ventricle, of both atria and of the aortic root, in which there is `blood`."""
     lung_dB: Level | None = None
     """Lung behind the free wall, at the epicardium, from which on it fades."""
     posterior_dB: Level | None = None
@@ -70,10 +70,10 @@ class Neighbours(Section):
     chest_wall_dB: Level | None = None
     """Brightest layers of the chest wall, between `surroundings.start_mm` and the heart."""
     leaflets_dB: BorderLevel | None = None
-    """Mitral leaflets, which are open while the cavity fills: echo power of one that lies across the beam at the focus;
-    as borders, they are fainter where they are oblique."""
+    """Mitral leaflets, open while the cavity fills, and cusps of the aortic valve, open while it empties: echo power of
+    one that lies across the beam at the focus; as borders, they are fainter where they are oblique."""
     papillary_muscles_dB: Level | None = None
-    """Two papillary muscles, which move with the endocardium; 0 for the echo of muscle."""
+    """Two papillary muscles, which move and shorten with the endocardium; 0 for the echo of muscle."""
 
     @property
     def any(self) -> bool:
@@ -175,7 +175,7 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
             "lung_dB": -1.0,
             "posterior_dB": 3.0,
             "chest_wall_dB": -1.0,
-            "leaflets_dB": 12.0,
+            "leaflets_dB": 20.0,
             "papillary_muscles_dB": 0.0,
         },
         "haze": {"max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},

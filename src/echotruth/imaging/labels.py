@@ -33,6 +33,9 @@ class TissueLabel(IntEnum):
     PAPILLARY_MUSCLE = 9
     LUNG = 10
     CHEST_WALL = 11
+    AORTIC_ROOT = 12
+    AORTIC_WALL = 13
+    AORTIC_CUSP = 14
 
 
 def pack(labels: Mapping[str, NDArray[np.generic]]) -> NDArray[np.generic]:

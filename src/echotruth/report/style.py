@@ -54,6 +54,9 @@ TISSUE_ENTRIES = {
     TissueLabel.PAPILLARY_MUSCLE: 3,
     TissueLabel.LUNG: 19,
     TissueLabel.CHEST_WALL: 10,
+    TissueLabel.AORTIC_ROOT: 12,
+    TissueLabel.AORTIC_WALL: 13,
+    TissueLabel.AORTIC_CUSP: 17,
 }
 """Tissue to the entry of Matplotlib's `tab20`: blood in a full colour, its wall in a pale one."""
 

@@ -57,11 +57,11 @@ NEWTON_STEPS = 3
 
 
 ATRIA = (TissueLabel.LEFT_ATRIUM, TissueLabel.RIGHT_ATRIUM)
-CAVITIES = (TissueLabel.RIGHT_VENTRICLE, *ATRIA)
+CAVITIES = (TissueLabel.RIGHT_VENTRICLE, *ATRIA, TissueLabel.AORTIC_ROOT)
 """Neighbours that are blood."""
-WALLS = (TissueLabel.RIGHT_FREE_WALL, TissueLabel.ATRIAL_WALL)
+WALLS = (TissueLabel.RIGHT_FREE_WALL, TissueLabel.ATRIAL_WALL, TissueLabel.AORTIC_WALL)
 """Neighbours that are muscle."""
-FOLLOWING_BASE = (*ATRIA, TissueLabel.ATRIAL_WALL)
+FOLLOWING_BASE = (*ATRIA, TissueLabel.ATRIAL_WALL, TissueLabel.AORTIC_ROOT, TissueLabel.AORTIC_WALL)
 """Neighbours that move with the base."""
 
 

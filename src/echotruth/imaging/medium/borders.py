@@ -83,7 +83,7 @@ class Epicardium(Border):
     name, level, surface = "epicardium", "borders.epicardium_dB", "epi"
 
 
-def border_amplitude(config: Config, level_dB: float) -> float:
+def border_amplitude(config: Config, level_dB: float, density: float = 1.0) -> float:
     """Amplitude of the scatterers of a border, relative to the standard deviation of those of muscle.
 
     With Gaussian beam and pulse of standard deviations s_x, s_y and s_z at the focus, muscle of density rho returns the
@@ -94,6 +94,8 @@ def border_amplitude(config: Config, level_dB: float) -> float:
     config : Config
     level_dB : float
         Echo power of a flat border across the beam at its focus over that of muscle.
+    density : float
+        Of the scatterers, over :func:`border_density`.
     """
     probe, focus = config.probe.si(), config.rf.si().focus
     wavelength = probe.sound_speed / probe.frequency
@@ -101,7 +103,7 @@ def border_amplitude(config: Config, level_dB: float) -> float:
     elevation = BEAM_STD * wavelength * focus / probe.height
     axial = PULSE_STD * probe.sound_speed / 2 / (probe.bandwidth * probe.frequency)
     power = config.phantom.si().density * sqrt(pi) * axial / (4 * pi * lateral * elevation)
-    return 10 ** (level_dB / 20) * sqrt(power) / border_density(config)
+    return 10 ** (level_dB / 20) * sqrt(power) / (density * border_density(config))
 
 
 def border_density(config: Config) -> float:

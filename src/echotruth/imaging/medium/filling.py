@@ -1,4 +1,4 @@
-"""Filling of the left ventricle, frame by frame: how far it is emptied, and how far the mitral valve is open."""
+"""Filling of the left ventricle, frame by frame: how far it is emptied, and how far its valves are open."""
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from echotruth.imaging.medium.blood import Cavity
 
 LEAST_STROKE = 1e-3
 """Change of the volume, over its mean, below which a heart does not beat and its valve stays shut."""
-FULLY_OPEN = 0.3
-"""Rate of filling, over its greatest, from which on the valve is fully open."""
+FULLY_OPEN = 0.6
+"""Rate of filling or emptying, over its greatest, from which on a valve is fully open; by eye."""
+HALF_OPEN = 0.35
+"""How far the mitral valve is open in diastasis, between two waves of filling; by eye, as in a human clip."""
 
 
 def volumes(heart: Heart) -> Floats:
@@ -27,13 +29,27 @@ def emptied(volume: Floats) -> Floats:
 
 
 def opening(volume: Floats) -> Floats:
-    """How far the mitral valve is open, (frame,): 0 where the volume (frame,), m^3, does not rise to the next frame.
+    """How far the mitral valve is open, (frame,), 0 to 1, from volumes (frame,), m^3; the frames close a cycle.
 
-    It follows the rate of filling, smoothly, up to 1. The frames are a cycle that closes.
+    It follows the rate of filling, smoothly. Between the first and the last frame in which it opens it is half open
+    where the cavity does not fill.
     """
+    share = _opened(volume, np.roll(volume, -1) - volume)
+    if (filling := np.flatnonzero(share > HALF_OPEN)).size:
+        diastole = slice(filling[0], filling[-1] + 1)
+        share[diastole] = np.maximum(share[diastole], HALF_OPEN)
+    return share
+
+
+def aortic_opening(volume: Floats) -> Floats:
+    """How far the aortic valve is open, (frame,), 0 to 1: as :func:`opening`, by the rate of emptying."""
+    return _opened(volume, volume - np.roll(volume, -1))
+
+
+def _opened(volume: Floats, rate: Floats) -> Floats:
+    """How far a valve is open, (frame,), through which blood flows at a rate (frame,), m^3 a frame."""
     if not _beats(volume):
         return np.zeros(len(volume))
-    rate = np.roll(volume, -1) - volume
     share = np.clip(rate / (FULLY_OPEN * rate.max()), 0, 1)
     return share**2 * (3 - 2 * share)
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
+from echotruth.imaging.medium.aortic_valve import AorticCusps
 from echotruth.imaging.medium.blood import Blood
 from echotruth.imaging.medium.body import Arrays, Body, Echoes, Scene
 from echotruth.imaging.medium.borders import Endocardium, Epicardium
@@ -15,7 +16,10 @@ from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles
 from echotruth.imaging.medium.surroundings import Surroundings
 from echotruth.imaging.medium.wall import Wall
 
-BODIES: tuple[type[Body], ...] = (Endocardium, Epicardium, Blood, Surroundings, Leaflets, PapillaryMuscles)
+BODIES: tuple[type[Body], ...] = (
+    *(Endocardium, Epicardium, Blood, Surroundings),
+    *(Leaflets, AorticCusps, PapillaryMuscles),
+)
 """What there may be besides the wall, in the order of the scatterers."""
 
 

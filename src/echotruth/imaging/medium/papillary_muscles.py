@@ -1,8 +1,15 @@
-"""Papillary muscles: two bodies of muscle in the cavity, attached to the free wall and carried by its endocardium.
+"""Papillary muscles: two fingers of muscle in the cavity, which rise from its wall towards the mitral valve.
 
-They are no part of the wall that is solved. In the short axis the anterolateral one is at four o'clock and the
-posteromedial one at half past seven, as seen in echoes. In adults they are 19 +- 4 and 22 +- 4 mm long (Anatomical
-variations of mitral papillary muscles, Madras Medical College). Width, height and azimuth were chosen by eye.
+They are no part of the wall that is solved. A muscle is round in cross-section, wide at its root in the wall and
+pointed at its tip, which stands free. It lies along a line in the endocardium from the depth of its root to that of
+its tip: it moves and turns with this line, is shortened as much, and becomes thicker so that its volume is kept. In
+adults muscles are 19 +- 4 and 22 +- 4 mm long (Anatomical variations of mitral papillary muscles, Madras Medical
+College) and shorten by 21 +- 9 % (anterolateral) and 17 +- 6 % (posteromedial) from end-diastole to end-systole (Madu
+et al., Med Sci Monit 7 (2001) CR1212).
+
+The anterolateral one is between the anterolateral and the inferolateral wall, at three o'clock in a short axis, and
+the posteromedial one at the inferior wall, at six o'clock, a right angle apart. So four- and two-chamber view show a
+finger, and the three-chamber view lies between both. Azimuths, depths, widths and shape were chosen by eye.
 """
 
 from dataclasses import dataclass
@@ -16,22 +23,28 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.fem.location import locate
 from echotruth.heart import Heart
+from echotruth.imaging.medium.anatomy import sampled
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.body import CavityBody, Scene
 
-AZIMUTHS = (7 * pi / 6, 7 * pi / 4)
+AZIMUTHS = (0.94 * pi, 1.48 * pi)
 """Of the anterolateral and of the posteromedial muscle, rad."""
-HEIGHT, HALF_LENGTH = 0.58, 0.14
-"""Depth of the middle below the base, and half the length, over the length of the cavity."""
-HALF_WIDTH, EMBEDDED = 0.22, 0.35
-"""Half the width over the radius of the endocardium there, and the share of it that the wall covers."""
-NEAREST = 8
-"""Nodes of the endocardium whose mean motion a muscle has."""
+ROOT, TIP = 0.64, 0.36
+"""Depth of root and tip below the base, over the length of the cavity."""
+HALF_WIDTH = 0.28
+"""Half the width at the root, over the distance of the endocardium from the axis there."""
+AWAY, LEANING = 0.35, 0.75
+"""Distance of the middle line from the line in the endocardium at the root, and how much more at the tip, over half
+the width: the muscle leans towards the axis of the cavity."""
+TAPER = 0.45
+"""Power of the distance from the tip that the width follows."""
+BELOW = 0.3
+"""Length of the rounded end below the root, over the distance from root to tip."""
 
 
 @dataclass(frozen=True, eq=False)
 class PapillaryMuscles(CavityBody):
-    """Scatterers in the two muscles, each of which moves as the endocardium at its root.
+    """Scatterers in the two muscles.
 
     Attributes
     ----------
@@ -53,89 +66,125 @@ class PapillaryMuscles(CavityBody):
 
         Their amplitudes are normally distributed; their variance in a volume is that of muscle times the level.
         """
-        random, heart = scene.random(cls.name), scene.heart
-        cavity, parts = Cavity(heart.endo), []
-        nodes = cavity.positions(heart.positions(0))
-        for muscle, azimuth in enumerate(AZIMUTHS):
-            middle, axes, half = _body(heart, azimuth)
-            number = random.poisson(scene.config.phantom.si().density * 8 * half.prod())
-            ball = random.uniform(-1, 1, (number, 3))
-            position = middle + (ball[np.linalg.norm(ball, axis=1) < 1] * half) @ axes
-            position = position[locate(nodes, cavity.cells, position).cell >= 0]
-            parts.append((position, np.full(len(position), muscle, np.uint8)))
+        random, parts = scene.random(cls.name), []
+        for number, azimuth in enumerate(AZIMUTHS):
+            muscle = PapillaryMuscle(scene.heart, azimuth)
+            low, high = muscle.extent
+            candidates = random.poisson(scene.config.phantom.si().density * (high - low).prod())
+            position = muscle.to_heart(0, random.uniform(low, high, (candidates, 3)))
+            position = position[muscle.contains(0, position)]
+            parts.append((position, np.full(len(position), number, np.uint8)))
         position, muscles = map(np.concatenate, zip(*parts, strict=True))
         amplitude = 10 ** (cls.level_dB(scene.config) / 20) * random.standard_normal(len(position))
         return cls(scene, position, muscles, amplitude)
 
     def in_heart(self, frame: int) -> Floats:
-        return self.position + self._displacement[frame, self.muscle]
+        position = np.empty_like(self.position)
+        for number, muscle in enumerate(self._muscles):
+            of_it = self.muscle == number
+            position[of_it] = muscle.to_heart(frame, muscle.to_muscle(0, self.position[of_it]))
+        return position
 
     def amplitudes(self, frame: int) -> Floats:
         return self.amplitude
 
     @cached_property
-    def _displacement(self) -> Floats:
-        return np.stack([_displacement(self.scene.heart, azimuth) for azimuth in AZIMUTHS], axis=1)
+    def _muscles(self) -> list["PapillaryMuscle"]:
+        return [PapillaryMuscle(self.scene.heart, azimuth) for azimuth in AZIMUTHS]
 
 
 class PapillaryMuscle:
     """Where one of the muscles is.
+
+    Its coordinates, m, are those of end-diastole: along the line from root to tip, from there towards the axis of the
+    cavity, and across both.
 
     Parameters
     ----------
     heart : Heart
     azimuth : float, rad
         One of `AZIMUTHS`.
+
+    Attributes
+    ----------
+    stretch : ndarray of shape (frame,)
+        Length of the muscle over that at end-diastole.
     """
 
     def __init__(self, heart: Heart, azimuth: float) -> None:
-        self._body, self._displacement = _body(heart, azimuth), _displacement(heart, azimuth)
+        frames, endo = range(len(heart.displacement)), np.unique(heart.endo)
+        positions = np.stack([heart.positions(frame)[endo] for frame in frames])
+        (self._root, width), (top, _) = (_wall_line(heart, azimuth, depth) for depth in (ROOT, TIP))
+        along = top - self._root
+        length = np.linalg.norm(along, axis=1)
+        self._length, self._half_width, self.stretch = float(length[0]), HALF_WIDTH * width, length / length[0]
+        self._axes = _axes(along / length[:, None], positions.mean(axis=1) - self._root)
         self._cavity = Cavity(heart.endo)
         self._start = self._cavity.positions(heart.positions(0))
 
     @property
+    def extent(self) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinates, (3,), m, of the muscle."""
+        width, reach = self._half_width, (1 + AWAY + LEANING) * self._half_width
+        return np.array([-BELOW * self._length, -width, -width]), np.array([self._length, reach, width])
+
+    @property
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest coordinates, (3,), m, in the heart frame, that the muscle reaches in any frame."""
-        middle, _, half = self._body
-        moved = middle + self._displacement
-        return moved.min(axis=0) - half.max(), moved.max(axis=0) + half.max()
+        corners = np.array(np.meshgrid(*np.stack(self.extent).T)).reshape(3, -1).T
+        reached = np.concatenate([self.to_heart(frame, corners) for frame in range(len(self.stretch))])
+        return reached.min(axis=0), reached.max(axis=0)
+
+    def tip(self, frame: int) -> Floats:
+        """Position of the tip in the heart frame in a frame, (3,), m."""
+        return self.to_heart(frame, np.array([self._length, (AWAY + LEANING) * self._half_width, 0.0]))
+
+    def to_heart(self, frame: int, place: Floats) -> Floats:
+        """Positions (n, 3), m, in the heart frame of coordinates (n, 3), m, in a frame."""
+        return self._root[frame] + (place * self._scale(frame)) @ self._axes[frame]
+
+    def to_muscle(self, frame: int, position: Floats) -> Floats:
+        """Coordinates (n, 3), m, of positions (n, 3), m, in the heart frame in a frame."""
+        return (position - self._root[frame]) @ self._axes[frame].T / self._scale(frame)
 
     def contains(self, frame: int, position: Floats) -> NDArray[np.bool_]:
         """Whether positions (n, 3), m, in the heart frame are in the muscle in a frame, (n,)."""
-        middle, axes, half = self._body
-        at_ed = position - self._displacement[frame]
-        inside = np.linalg.norm((at_ed - middle) @ axes.T / half, axis=1) < 1
-        inside[inside] = locate(self._start, self._cavity.cells, at_ed[inside]).cell >= 0
+        place = self.to_muscle(frame, position)
+        along = place[:, 0] / self._length
+        above = np.clip(1 - np.maximum(along, 0), 0, None) ** TAPER
+        below = np.sqrt(np.maximum(1 - (np.minimum(along, 0) / BELOW) ** 2, 0))
+        middle = (AWAY + LEANING * np.maximum(along, 0)) * self._half_width
+        inside = np.hypot(place[:, 1] - middle, place[:, 2]) < self._half_width * above * below
+        at_ed = self.to_heart(0, place[inside])
+        inside[inside] = locate(self._start, self._cavity.cells, at_ed).cell >= 0
         return inside
 
-
-def _displacement(heart: Heart, azimuth: float) -> Floats:
-    """Displacement of a muscle since end-diastole, (frame, 3), m: the mean of the endocardium at its root."""
-    endo = np.unique(heart.endo)
-    start, moved = heart.positions(0)[endo], (heart.displacement - heart.displacement[0])[:, endo]
-    distance = np.linalg.norm(start - _root(heart, azimuth), axis=1)
-    return moved[:, np.argsort(distance, kind="stable")[:NEAREST]].mean(axis=1)
+    def _scale(self, frame: int) -> Floats:
+        """Stretch along the axes of the muscle, (3,); their product is 1."""
+        stretch = self.stretch[frame]
+        return np.array([stretch, stretch**-0.5, stretch**-0.5])
 
 
-def _root(heart: Heart, azimuth: float) -> Floats:
-    """Point of the endocardium, (3,), m, at end-diastole, to which the muscle at an azimuth, rad, is attached."""
+def _axes(along: Floats, inwards: Floats) -> Floats:
+    """Unit vectors (frame, 3, 3), rows, along unit vectors (frame, 3), most inwards of those across, and the third."""
+    inwards = inwards - np.sum(inwards * along, axis=1, keepdims=True) * along
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    return np.stack([along, inwards, np.cross(along, inwards)], axis=1)
+
+
+def _wall_line(heart: Heart, azimuth: float, depth: float) -> tuple[Floats, float]:
+    """Positions (frame, 3), m, of a point of the endocardium, and its distance from the axis at end-diastole, m.
+
+    At end-diastole it is at an azimuth, rad, and a depth below the base over the length of the cavity.
+    """
     nodes = heart.positions(0)
-    rim, endo = nodes[Cavity(heart.endo).rim].mean(axis=0), nodes[np.unique(heart.endo)]
-    radial = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    height = rim[2] + HEIGHT * (endo[:, 2].min() - rim[2])
-    # Of the nodes on that side, the one nearest to the ray from the axis.
-    outward = (endo - rim) @ radial
-    beside = endo - rim - outward[:, None] * radial
-    beside[:, 2] = endo[:, 2] - height
-    distance = np.where(outward > 0, np.linalg.norm(beside, axis=1), np.inf)
-    return np.array([rim[0], rim[1], height]) + outward[np.argmin(distance)] * radial
-
-
-def _body(heart: Heart, azimuth: float) -> tuple[Floats, Floats, Floats]:
-    """Middle (3,), m, axes (3, 3), rows radial, circumferential, longitudinal, and half axes (3,), m, of a muscle."""
-    root, endo = _root(heart, azimuth), heart.endo_at_ed[:, 2]
-    radial = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-    axes = np.stack([radial, np.cross([0, 0, 1.0], radial), [0, 0, 1.0]])
-    width = HALF_WIDTH * float(np.hypot(*root[:2]))
-    half = np.array([width, width, HALF_LENGTH * float(np.ptp(endo))])
-    return root - (1 - EMBEDDED) * width * radial, axes, half
+    rim, points = nodes[Cavity(heart.endo).rim].mean(axis=0), sampled(nodes, heart.endo)
+    radial, height = np.array([np.cos(azimuth), np.sin(azimuth), 0.0]), depth * (points[:, 2].min() - rim[2])
+    # Of the points on that side, the one nearest to the ray from the axis.
+    outward = (points - rim) @ radial
+    beside = points - rim - outward[:, None] * radial - [0, 0, height]
+    nearest = int(np.argmin(np.where(outward > 0, np.linalg.norm(beside, axis=1), np.inf)))
+    facet, point = divmod(nearest, len(points) // len(heart.endo))
+    facets = heart.endo[facet : facet + 1]
+    moved = [sampled(heart.positions(frame), facets)[point] for frame in range(len(heart.displacement))]
+    return np.stack(moved), float(outward[nearest])

@@ -28,6 +28,7 @@ from echotruth.imaging.medium.anatomy import (
     chest_wall_depth,
     strata_dB,
 )
+from echotruth.imaging.medium.aortic_root import AORTIC_WALL_DB, aortic_tissue
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.body import Body, Echoes, Scene
 from echotruth.imaging.medium.filling import emptied, volumes
@@ -274,9 +275,11 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
     _set_lung(config, plane, (tissue, level), place, anatomy.radius)
     _set_posterior(config, plane, (tissue, level), anatomy, position)
     if realism.neighbours.chambers_dB is not None:
-        chambers = anatomy.chambers(position, place)
+        chambers, root = anatomy.chambers(position, place), aortic_tissue(heart, position)
+        chambers[root > 0] = root[root > 0]
         cavity = np.isin(chambers, CAVITIES)
         levels = np.where(cavity, _decibels(realism.blood.level_dB), realism.neighbours.chambers_dB)
+        levels[root == TissueLabel.AORTIC_WALL] += AORTIC_WALL_DB
         tissue[chambers > 0], level[chambers > 0] = chambers[chambers > 0], levels[chambers > 0]
     if realism.neighbours.chest_wall_dB is not None:
         start = realism.surroundings.si().start

@@ -20,6 +20,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import FOLLOWING_BASE, above_lid
+from echotruth.imaging.medium.aortic_valve import AorticValve
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.mitral_valve import MitralValve
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
@@ -27,6 +28,7 @@ from echotruth.imaging.medium.surroundings import SurroundingsMotion, tissues
 from echotruth.imaging.view import Plane
 
 Labels = NDArray[np.uint8]
+CavityPart = MitralValve | AorticValve | PapillaryMuscle
 
 KNOTS = 65
 """Points along each side of the image at which the motion of what is around the heart is computed."""
@@ -147,12 +149,13 @@ class TissueImages:
         return np.flatnonzero(((self._position >= low) & (self._position <= high)).all(axis=1))
 
     @cached_property
-    def _bodies(self) -> list[tuple[TissueLabel, MitralValve | PapillaryMuscle, NDArray[np.int64]]]:
+    def _bodies(self) -> list[tuple[TissueLabel, CavityPart, NDArray[np.int64]]]:
         """Bodies in the cavity, and the indices of the pixels that may be in each in any frame."""
         levels = self._config.realism.neighbours
-        bodies: list[tuple[TissueLabel, MitralValve | PapillaryMuscle]] = []
+        bodies: list[tuple[TissueLabel, CavityPart]] = []
         if levels.leaflets_dB is not None:
             bodies.append((TissueLabel.MITRAL_LEAFLET, MitralValve(self._heart)))
+            bodies.append((TissueLabel.AORTIC_CUSP, AorticValve(self._heart)))
         if levels.papillary_muscles_dB is not None:
             muscles = [PapillaryMuscle(self._heart, azimuth) for azimuth in AZIMUTHS]
             bodies += [(TissueLabel.PAPILLARY_MUSCLE, muscle) for muscle in muscles]

@@ -1,0 +1,134 @@
+"""The aortic valve: cusps hinged at the aortic annulus, open while the left ventricle empties.
+
+In every plane through the axis of the root a cusp is an arc that keeps its length. Shut, the cusps meet on the axis,
+below the widest part of the root, and are convex towards the ventricle; open they stand beside its walls. They echo as
+mitral leaflets do. Adults have cusps some 17 to 20 mm high; here they are 16 mm. That the cusps are a surface of
+revolution, angles and thickness were chosen by eye.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import atan2, hypot, pi, radians
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from echotruth.arrays import Floats
+from echotruth.heart import Heart
+from echotruth.imaging.labels import TissueLabel
+from echotruth.imaging.medium import arc
+from echotruth.imaging.medium.annulus import Rim, Ring
+from echotruth.imaging.medium.aortic_root import valve_ring
+from echotruth.imaging.medium.body import CavityBody, Scene
+from echotruth.imaging.medium.borders import border_amplitude, border_density
+from echotruth.imaging.medium.filling import aortic_opening, volumes
+from echotruth.imaging.medium.mitral_valve import DENSITY
+from echotruth.imaging.medium.surroundings import SurroundingsMotion
+
+MEETING = (0.97, 0.75)
+"""Where the edges are when shut, from the annulus towards the axis and along it, over the radius of the annulus."""
+TURN = radians(60)
+"""How far a cusp turns from base to edge when shut, rad."""
+OPEN = radians(88)
+"""Angle of a cusp above the annulus when open, rad."""
+NARROWING = 0.7
+"""How much less of a cusp there is at its edge than at its base."""
+THICKNESS = 0.08
+"""Over the radius of the annulus: 1 mm in the human preset."""
+POINTS = 12
+"""Of the annulus, by which its motion is known."""
+
+
+class AorticValve:
+    """Where the cusps are.
+
+    Attributes
+    ----------
+    opening : ndarray of shape (frame,)
+        As of :func:`echotruth.imaging.medium.filling.aortic_opening`.
+
+    Parameters
+    ----------
+    heart : Heart
+    """
+
+    def __init__(self, heart: Heart) -> None:
+        self.opening = aortic_opening(volumes(heart))
+        self._azimuth = np.linspace(0, 2 * pi, POINTS, endpoint=False)
+        points = valve_ring(Rim(heart)(0), self._azimuth)
+        # With the base, as the root does; a decay length has no part in that.
+        self._motion = SurroundingsMotion(heart, points, 1.0, np.full(POINTS, TissueLabel.AORTIC_WALL, np.uint8))
+
+    def ring(self, frame: int) -> Ring:
+        """The aortic annulus in a frame."""
+        points = self._motion(frame)
+        area = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+        return Ring.of(points, self._azimuth, area / np.linalg.norm(area))
+
+    @property
+    def box(self) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinates, (3,), m, in the heart frame, that the cusps reach in any frame."""
+        rings = [self.ring(frame) for frame in range(len(self.opening))]
+        middles, reach = np.stack([ring.middle for ring in rings]), 2 * max(ring.radius for ring in rings)
+        return middles.min(axis=0) - reach, middles.max(axis=0) + reach
+
+    def cusp(self, frame: int, azimuth: Floats, share: Floats) -> Floats:
+        """Points of the cusps in a frame, (n, 3), m, at azimuths (n,), rad, and shares (n,) of their length."""
+        inward, up = (_length() * arc.points(*self._angles(frame), share)).T
+        radius = 1 - inward
+        return self.ring(frame).to_heart(np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), up]))
+
+    def contains(self, frame: int, position: Floats) -> NDArray[np.bool_]:
+        """Whether positions (n, 3), m, in the heart frame are in a cusp in a frame, (n,)."""
+        place = self.ring(frame).to_ring(position)
+        profile = np.column_stack([1 - np.hypot(place[:, 0], place[:, 1]), place[:, 2]]) / _length()
+        share, across = arc.inverse(*self._angles(frame), profile)
+        return (share > 0) & (share < 1) & (np.abs(across) * _length() < THICKNESS / 2)
+
+    def _angles(self, frame: int) -> tuple[float, float]:
+        """Angles of a cusp above the annulus at base and edge in a frame, rad."""
+        share, middle = float(self.opening[frame]), atan2(MEETING[1], MEETING[0])
+        first, last = middle - TURN / 2, middle + TURN / 2
+        return first + (OPEN - first) * share, last + (OPEN - last) * share
+
+
+@dataclass(frozen=True, eq=False)
+class AorticCusps(CavityBody):
+    """Scatterers of the aortic valve.
+
+    Attributes
+    ----------
+    place : ndarray of shape (n, 2)
+        Azimuth around the root, rad, and share of the length from the annulus.
+    amplitude : ndarray of shape (n,)
+    """
+
+    name, level = "aortic_cusps", "neighbours.leaflets_dB"
+    place: Floats
+    amplitude: Floats
+
+    @classmethod
+    def seed(cls, scene: Scene) -> Self:
+        """Draw scatterers over the cusps, as dense as in mitral leaflets, with amplitudes of a border of the level."""
+        random, radius = scene.random(cls.name), AorticValve(scene.heart).ring(0).radius
+        number = random.poisson(DENSITY * border_density(scene.config) * 2 * pi * _length() * radius**2)
+        azimuth, share = random.uniform(0, 2 * pi, number), random.random(number)
+        place = np.column_stack([azimuth, share])[random.random(number) > NARROWING * share]
+        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config), DENSITY)
+        return cls(scene, place, np.full(len(place), amplitude))
+
+    def in_heart(self, frame: int) -> Floats:
+        return self._valve.cusp(frame, *self.place.T)
+
+    def amplitudes(self, frame: int) -> Floats:
+        return self.amplitude
+
+    @cached_property
+    def _valve(self) -> AorticValve:
+        return AorticValve(self.scene.heart)
+
+
+def _length() -> float:
+    """Length of a cusp over the radius of the annulus."""
+    return hypot(*MEETING) / arc.chord(TURN)
