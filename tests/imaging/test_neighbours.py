@@ -14,7 +14,6 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.filling import aortic_opening, emptied, opening, volumes
 from echotruth.imaging.medium.surroundings import Surroundings, tissues
 
-
 LEVELS = {
     "chambers_dB": 0.0,
     "lung_dB": 2.0,

@@ -81,23 +81,24 @@ DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
     ("dcm", "human"): {"loop.circulation.contractility": 0.7},
 }
 """`pathology.preset` and `geometry.preset` -> what differs from that."""
-REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.2}
+REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.15}
 """`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
 over those of the array."""
 REALISM_HARMONIC = {"human": 1.25}
 """`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
 its half. Presets that are not here have no harmonic imaging."""
-REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 130}
+REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 110}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, Any] = {
     "probe.attenuation_dB_per_cm_MHz": 0.5,
     "bmode.dynamic_range_dB": 50.0,
-    "bmode.gain_dB": -12.0,
     "bmode.grey_gamma": 1.3,
     "bmode.smoothing": 0.7,
     "bmode.dropout.edge_loss_dB": 12.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
+REALISM_GAIN_DB = {"mouse": -12.0, "human": -10.5}
+"""`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
     "human": {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
@@ -106,10 +107,10 @@ REALISM_SCAN: dict[str, dict[str, float]] = {
 seen."""
 REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
     "mouse": {0.1: 8, 0.17: 5, 0.23: 3, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
-    "human": {0.1: 19, 0.17: 15, 0.23: 8, 0.3: 2, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
+    "human": {0.1: 20, 0.17: 16, 0.23: 9, 0.3: 2, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
 }
-"""`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: an even medium is as
-bright at any range of the default array with it."""
+"""`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: with it, an even
+medium is as bright at any range of the default array."""
 
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""
@@ -170,7 +171,7 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
         return {}
     width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
     found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, name)
-    found |= _scan(array, name)
+    found |= {"bmode.gain_dB": REALISM_GAIN_DB[name]} | _scan(array, name)
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
     share, density, ratio = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3", 1.0

@@ -168,8 +168,8 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
         },
         "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
         "decorrelation": {"time_ms": times_ms[0]},
-        "blood": {"level_dB": -22.0, "decorrelation_time_ms": times_ms[1]},
-        "surroundings": {"level_dB": -9.0, "start_mm": scale, "motion_decay_mm": scale},
+        "blood": {"level_dB": -24.0, "decorrelation_time_ms": times_ms[1]},
+        "surroundings": {"level_dB": -10.0, "start_mm": scale, "motion_decay_mm": scale},
         "neighbours": {
             "chambers_dB": 0.0,
             "lung_dB": -1.0,
@@ -188,7 +188,7 @@ REALISM_PRESETS: dict[str, dict[str, Any]] = {
     "mouse": _preset(
         1.0,
         (500.0, 14.0),
-        {"backscatter": {"fibre_strain_dB": 30.0}, "noise": {"snr_dB": 60.0}, "haze": {"level_dB": -8.0}},
+        {"backscatter": {"fibre_strain_dB": 30.0}, "noise": {"snr_dB": 60.0}, "haze": {"level_dB": -9.0}},
     ),
     "human": _preset(
         12.5,

@@ -3,7 +3,8 @@
 Sound that went to and fro between array, skin and ribs arrives later than the direct echo, so it is drawn deeper; but
 its wavefront is still that of the near position, so it is out of focus there and smeared over the lines. Byram & Shu
 (2016, J Med Imaging 3:046005) simulate it so: linear echoes of near scatterers, shifted later by random times. With
-times from an exponential distribution, some in every resolution cell, they reproduce the statistics of clutter.
+times from an exponential distribution, some in every resolution cell, they reproduce the statistics of clutter. They
+are attenuated on their further way and spread on it, as from the farthest of what is near.
 """
 
 from math import ceil, log, pi, sqrt
@@ -42,6 +43,7 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
     number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * h.mean_extra_range / resolution)
     deeper = random.exponential(h.mean_extra_range, number)
     amplitude = random.standard_normal(number) * 10 ** (haze.level_dB / 20) / sqrt(number)
+    amplitude *= h.max_source_range / (h.max_source_range + deeper)
     return np.column_stack([deeper, amplitude])[deeper < depth - h.max_source_range]
 
 
