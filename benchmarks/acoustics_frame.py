@@ -11,7 +11,7 @@ from worker import Clock, medians
 
 from echotruth.config import Bmode, Rf
 from echotruth.imaging.beamforming.scan import scan_lines
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.beamforming.synthesis import TransmitSynthesis
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
 from echotruth.imaging.bmode import bmode_clip
@@ -32,7 +32,7 @@ def frame(
     """Seconds of the parts of a frame, from scatterers to uint8; medians; `probe` and `changes` replace keys."""
     setup = ARRAYS[array]
     array_, (rf, bmode) = setup.probe(**(probe or {})), scan(setup, **changes)
-    scanner = Scanner(array_, rf, imaging_depth(rf, bmode))
+    scanner = Scanner(array_, rf, bmode.si().field_of_view)
     channels = TransmitSynthesis(
         scanner.matrix, array_.si().frequency, TRANSMIT_SEQUENCES[rf.transmit](array_, rf, scanner.scan)
     )
@@ -46,7 +46,7 @@ def lines(array: str, scatterers: int, probe: dict[str, Any], **changes: Any) ->
     setup = ARRAYS[array]
     rf, bmode = scan(setup, **changes)
     return len(
-        Scanner(setup.probe(**probe), rf, imaging_depth(rf, bmode)).lines(*setup.scatterers(scatterers, thick=True))
+        Scanner(setup.probe(**probe), rf, bmode.si().field_of_view).lines(*setup.scatterers(scatterers, thick=True))
     )
 
 

@@ -311,11 +311,12 @@ def report(results: dict[str, dict[str, list[float | None]]]) -> str:
     counts = []
     for name, rows_within in within.items():
         free = [value for row, value in rows_within.items() if row not in FITTED]
-        counts.append(f"- {name}: {sum(rows_within.values())} of {len(real)} rows, {sum(free)} of {len(free)} not fitted")
+        all_rows = f"{sum(rows_within.values())} of {len(real)} rows"
+        counts.append(f"- {name}: {all_rows}, {sum(free)} of {len(free)} not fitted")
     note = (
         "Means over frames of a cycle of a four-chamber view; the range is that over the frames of the real clip. Grey"
-        " levels are of 255. It is one recording of one person: what lies outside need not be wrong. The image of a mouse"
-        " ends before the roof of its atria. `benchmarks/realism.py` says how."
+        " levels are of 255. It is one recording of one person: what lies outside need not be wrong. The image of a"
+        " mouse ends before the roof of its atria. `benchmarks/realism.py` says how."
     )
     head = ["", "real", "its frames", *ours, ""]
     lines = ["# How alike ours and a real clip are", "", note, "", *table(head, rows), "", "Within the range:", ""]

@@ -54,6 +54,7 @@ OPTIONAL = (
     "surroundings",
     "leaflets",
     "aortic_cusps",
+    "tricuspid_leaflets",
     "papillary_muscles",
     "channels",
     "transmit",

@@ -6,7 +6,7 @@ from scenes import medium, random, scene
 
 from echotruth.config import Config, Probe
 from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
+from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
@@ -25,7 +25,7 @@ ALL = {
 @pytest.fixture(scope="module")
 def scanner():
     config = Config.model_validate(SMALL)
-    return Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+    return Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from scenes import scene
 
 from echotruth.config import Config
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.medium.borders import Endocardium, Epicardium, border_amplitude
 from echotruth.imaging.medium.mitral_valve import Leaflets, Part
 
@@ -47,7 +47,7 @@ def test_amplitude_grows_with_the_area(heart):
 @pytest.fixture(scope="module")
 def level():
     """Function of positions (n, 3), m, about the focus and amplitudes (n,): greatest power over that of muscle, dB."""
-    scanner = Scanner(CONFIG.probe, CONFIG.rf, imaging_depth(CONFIG.rf, CONFIG.bmode))
+    scanner = Scanner(CONFIG.probe, CONFIG.rf, CONFIG.bmode.si().field_of_view)
     focus, random = CONFIG.rf.si().focus, np.random.default_rng(4)
     middle, near = np.argsort(np.abs(scanner.scan.angle))[:6], np.abs(scanner.range - focus) < 0.4e-3
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from echotruth.config import Bmode, Probe, Rf
-from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions, scan_lines, scan_width
+from echotruth.config import Probe, Rf
+from echotruth.imaging.beamforming.scan import sample_positions, scan_lines, scan_width
 
 RANGE = np.linspace(1e-3, 9e-3, 11)
 
@@ -39,9 +39,3 @@ def test_samples_of_a_sector_lie_in_polar_coordinates():
     lateral, axial = sample_positions(scan_lines(Probe(), Rf(lines=17, sector_deg=60)), RANGE)
     assert np.allclose(lateral[-1], RANGE / 2)
     assert np.allclose(axial[-1], RANGE * np.sqrt(3) / 2)
-
-
-def test_depth_reaches_the_corner_of_the_field_of_view_or_the_edge_of_the_scan():
-    assert imaging_depth(Rf(sector_deg=64), Bmode()) == pytest.approx(np.hypot(12e-3, 6e-3))
-    assert imaging_depth(Rf(sector_deg=40), Bmode()) == pytest.approx(12e-3 / np.cos(np.radians(20)))
-    assert imaging_depth(Rf(scan="linear"), Bmode()) == pytest.approx(12e-3)

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.exact_sum import exact_matrix
 from echotruth.config import Config, Probe
 from echotruth.config.loading import ConfigError, validate
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
 
 DEPTH = 11e-3
@@ -90,7 +90,7 @@ def test_a_power_of_zero_leaves_every_byte_as_it_is(plane):
 
 def test_lines_are_those_of_the_same_power_and_bad_powers_are_refused():
     config = Config.model_validate({"probe": {"elements": 16}, "rf": {"lines": 16, "elevation_beam": False}})
-    scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+    scanner = Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
     position, amplitude = sector(50)
     lines = scanner.lines(position, amplitude, 2.0)
     assert np.array_equal(lines, scanner.beamform(scanner.matrix(position, amplitude, np.full(50, 2.0))))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scenes import random, scene
 
-from echotruth.config import Config
+from echotruth.config import Config, Rf
 from echotruth.imaging.labels import TissueLabel, unpack
 from echotruth.imaging.medium.anatomy import FOLLOWING_BASE
 from echotruth.imaging.medium.mitral_valve import Leaflets, Part
@@ -120,7 +120,8 @@ def test_bodies_in_the_cavity_are_where_their_scatterers_are(at, heart, plane):
 def test_cavity_and_right_ventricle_narrow_as_the_heart_does_and_the_docs_say(heart):
     """The right ventricle loses 40 % of its width; the cavity narrows by a fifth both ways, and descends by 0.5 mm."""
     at = imaging_plane(CONFIG.views["mid"], CONFIG.rf, heart.endo_at_ed)
-    images = TissueImages(CONFIG, heart, at, AXIAL, LATERAL)
+    # A sector in which all of the right ventricle is seen.
+    images = TissueImages(CONFIG.model_copy(update={"rf": Rf(sector_deg=110)}), heart, at, AXIAL, LATERAL)
     ed, es = (images(frame) for frame in (0, ES))
     blood = (TissueLabel.CAVITY, TissueLabel.PAPILLARY_MUSCLE)
     areas = [np.isin(image, blood).sum() for image in (ed, es)]

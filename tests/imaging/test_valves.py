@@ -17,6 +17,7 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.mitral_valve import ANNULUS, LEAFLETS, Leaflets, MitralValve, Part
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle, PapillaryMuscles
 from echotruth.imaging.medium.tissue_images import TissueImages
+from echotruth.imaging.medium.tricuspid_valve import TricuspidValve
 from echotruth.imaging.view import imaging_plane
 
 CONFIG = Config.model_validate(
@@ -209,3 +210,32 @@ def test_the_anterior_leaflet_is_beside_the_root(heart):
     outwards = np.array([np.cos(ANTERIOR), np.sin(ANTERIOR), 0.3])
     near = base + np.linspace(0, 0.2e-3, 21)[:, None] * outwards
     assert TissueLabel.AORTIC_WALL in aortic_tissue(heart, near)
+
+
+def test_tricuspid_leaflets_meet_when_shut_and_point_into_the_ventricle_when_open(heart):
+    valve = TricuspidValve(heart)
+    across, ends = np.zeros(2), np.ones(2)
+    shut, open_ = int(np.argmin(valve.opening)), int(np.argmax(valve.opening))
+    septal, free = valve.leaflet(shut, np.array([-1.0, 1.0]), across, ends)
+    assert np.linalg.norm(septal - free) < 1e-9
+    assert valve.ring(shut).to_ring(septal[None])[0, 2] == pytest.approx(-2 * 0.15, rel=1e-9)
+    septal, free = valve.ring(open_).to_ring(valve.leaflet(open_, np.array([-1.0, 1.0]), across, ends))
+    assert septal[2] < -0.9 and np.linalg.norm(septal - free) > 1.4
+    for frame in (shut, open_):  # Lengths are kept.
+        share = np.linspace(0, 1, 200)
+        line = valve.ring(frame).to_ring(valve.leaflet(frame, np.ones(200), np.full(200, 0.3), share))
+        length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+        start = valve.ring(shut).to_ring(valve.leaflet(shut, np.ones(200), np.full(200, 0.3), share))
+        assert length == pytest.approx(np.linalg.norm(np.diff(start, axis=0), axis=1).sum(), rel=1e-3)
+
+
+def test_tricuspid_leaflets_are_where_their_scatterers_are(heart):
+    valve, random_ = TricuspidValve(heart), np.random.default_rng(2)
+    side = random_.choice([-1.0, 1.0], 300)
+    across, share = random_.uniform(-0.9, 0.9, 300), random_.uniform(0.05, 0.95, 300)
+    for frame in range(len(valve.opening)):
+        place = valve.leaflet(frame, side, across, share)
+        assert valve.contains(frame, place).all()
+        low, high = valve.box
+        assert ((place >= low) & (place <= high)).all()
+        assert not valve.contains(frame, place + 0.3 * valve.ring(frame).radius * np.array([0, 0, 1.0])).all()

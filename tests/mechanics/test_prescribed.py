@@ -13,7 +13,7 @@ from echotruth.config.loading import load
 from echotruth.fem.tetrahedra import Mesh, shape
 from echotruth.fem.volume import cell_volumes
 from echotruth.heart import Heart
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip, time_gain_compensation
 from echotruth.imaging.medium.wall import Wall
 from echotruth.imaging.view import imaging_plane
@@ -201,7 +201,7 @@ def test_the_image_moves_as_asked():
     setting = Config(**{**setting.model_dump(include={"geometry", "loop", "motion"}), **imaging})
     moving = heart(setting)
     scatterers = Wall.seed(scene(setting, moving))
-    scanner = Scanner(setting.probe, setting.rf, imaging_depth(setting.rf, setting.bmode))
+    scanner = Scanner(setting.probe, setting.rf, setting.bmode.si().field_of_view)
     lines = np.stack([scanner.lines(scatterers.positions(frame), scatterers.amplitude) for frame in (0, 1)])
     gain = time_gain_compensation(setting.probe, setting.bmode, scanner.range)
     before, after = bmode_clip(lines, scanner.scan, scanner.range, setting.bmode, gain)[512].astype(float)

@@ -7,7 +7,7 @@ import pytest
 from finished_repository import begin, blank, do
 
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Probe, Rf, Tracking, View
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.recorder import RfRecorder, sixteen_bit
 from echotruth.workflow.job import Job
 
@@ -31,7 +31,7 @@ def configured(keep, **rf):
 def scanner(**rf):
     """One for all that is to be kept: making it takes longer than a frame."""
     config = configured([], **rf)
-    return Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+    return Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
 
 
 def scatterers(seed):

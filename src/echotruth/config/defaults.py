@@ -87,17 +87,17 @@ over those of the array."""
 REALISM_HARMONIC = {"human": 1.25}
 """`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
 its half. Presets that are not here have no harmonic imaging."""
-REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 110}
+REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 165}
 """`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
 REALISM_IMAGE: dict[str, Any] = {
     "probe.attenuation_dB_per_cm_MHz": 0.5,
     "bmode.dynamic_range_dB": 50.0,
     "bmode.grey_gamma": 1.3,
-    "bmode.smoothing": 0.7,
-    "bmode.dropout.edge_loss_dB": 12.0,
+    "bmode.smoothing": 0.65,
+    "bmode.dropout.edge_loss_dB": 14.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_GAIN_DB = {"mouse": -12.0, "human": -10.5}
+REALISM_GAIN_DB = {"mouse": -12.0, "human": -11.0}
 """`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
@@ -107,7 +107,7 @@ REALISM_SCAN: dict[str, dict[str, float]] = {
 seen."""
 REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
     "mouse": {0.1: 8, 0.17: 5, 0.23: 3, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
-    "human": {0.1: 20, 0.17: 16, 0.23: 9, 0.3: 2, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
+    "human": {0.1: 19, 0.17: 13, 0.23: 5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
 }
 """`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: with it, an even
 medium is as bright at any range of the default array."""

@@ -234,7 +234,8 @@ class Bmode(Section):
     """Conversion of RF to 8-bit images: gain, log compression, and what a scanner does to images after it."""
 
     field_of_view_mm: Annotated[FiniteFloat, Field(gt=0, le=1000)] = 12.0
-    """Side of the square image; the array is in the middle of its upper edge. Default: from `probe.preset`."""
+    """Side of the square image, and greatest range; the array is in the middle of its upper edge. Default: from
+    `probe.preset`."""
     size_px: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pixels along a side of the full image."""
     downsampling: Annotated[tuple[Divisor, ...], Field(min_length=1), BeforeValidator(_as_tuple)] = (1, 2, 4)

@@ -70,8 +70,8 @@ class Neighbours(Section):
     chest_wall_dB: Level | None = None
     """Brightest layers of the chest wall, between `surroundings.start_mm` and the heart."""
     leaflets_dB: BorderLevel | None = None
-    """Mitral leaflets, open while the cavity fills, and cusps of the aortic valve, open while it empties: echo power of
-    one that lies across the beam at the focus; as borders, they are fainter where they are oblique."""
+    """Mitral and tricuspid leaflets, open while the cavity fills, and cusps of the aortic valve, open while it empties:
+    echo power of one that lies across the beam at the focus; as borders, they are fainter where they are oblique."""
     papillary_muscles_dB: Level | None = None
     """Two papillary muscles, which move and shorten with the endocardium; 0 for the echo of muscle."""
 
@@ -163,10 +163,10 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
     preset = {
         "backscatter": {
             "anisotropy_dB": 8.0,
-            "variation_dB": 3.0,
-            "variation_length_mm": scale,
+            "variation_dB": 4.5,
+            "variation_length_mm": 1.3 * scale,
         },
-        "borders": {"endocardium_dB": 10.0, "epicardium_dB": 13.0},
+        "borders": {"endocardium_dB": 10.0, "epicardium_dB": 10.0},
         "decorrelation": {"time_ms": times_ms[0]},
         "blood": {"level_dB": -24.0, "decorrelation_time_ms": times_ms[1]},
         "surroundings": {"level_dB": -10.0, "start_mm": scale, "motion_decay_mm": scale},
@@ -175,7 +175,7 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
             "lung_dB": -1.0,
             "posterior_dB": 3.0,
             "chest_wall_dB": -1.0,
-            "leaflets_dB": 20.0,
+            "leaflets_dB": 15.0,
             "papillary_muscles_dB": 0.0,
         },
         "haze": {"max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
@@ -196,7 +196,7 @@ REALISM_PRESETS: dict[str, dict[str, Any]] = {
         {
             "backscatter": {"fibre_strain_dB": 10.0},
             "noise": {"snr_dB": 75.0},
-            "haze": {"level_dB": -1.0},
+            "haze": {"level_dB": -0.5},
             "aberration": {"delay_ns": 21.3, "correlation_length_mm": 2.5},
             "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -4.0},
         },

@@ -9,7 +9,7 @@ import numpy as np
 
 from echotruth.config import Config
 from echotruth.imaging.beamforming.aperture import Aperture, harmonic
-from echotruth.imaging.beamforming.scan import imaging_depth, sample_positions
+from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner, validate_scatterers
 from echotruth.imaging.medium.medium import Medium
 from echotruth.imaging.medium.random_process import Random
@@ -42,7 +42,7 @@ class Acquisition:
         self._growth_range = config.rf.si().focus if config.rf.harmonic else 0.0
         self._screen = _screen(config, scanner.matrix.frequency, random) if realism.aberration.delay_ns else ()
         if realism.haze.level_dB is not None:
-            echoes = reverberation(realism.haze, config.probe, imaging_depth(config.rf, config.bmode), random("haze"))
+            echoes = reverberation(realism.haze, config.probe, config.bmode.si().field_of_view, random("haze"))
             self._haze_range = realism.haze.si().max_source_range
             self._filter = 1 + reverberation_filter(echoes, config.probe, scanner.matrix.frequency)
         if realism.shadow.side != "none":

@@ -36,6 +36,7 @@ class TissueLabel(IntEnum):
     AORTIC_ROOT = 12
     AORTIC_WALL = 13
     AORTIC_CUSP = 14
+    TRICUSPID_LEAFLET = 15
 
 
 def pack(labels: Mapping[str, NDArray[np.generic]]) -> NDArray[np.generic]:

@@ -9,7 +9,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.beamforming.scanner import Scanner, imaging_depth
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.medium.body import Arrays, Scene
 from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.medium.random_process import Random
@@ -42,7 +42,7 @@ class Sequence:
 
     def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random, time: Floats | None = None) -> None:
         self._scene = Scene(config, heart, plane, random, frame_times(config.loop) if time is None else time)
-        self.scanner = Scanner(config.probe, config.rf, imaging_depth(config.rf, config.bmode))
+        self.scanner = Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
 
     def scatterers(self) -> Arrays:
         """Draw the scatterers of the view; see :func:`echotruth.imaging.medium.medium.seed_medium`."""

@@ -57,6 +57,7 @@ TISSUE_ENTRIES = {
     TissueLabel.AORTIC_ROOT: 12,
     TissueLabel.AORTIC_WALL: 13,
     TissueLabel.AORTIC_CUSP: 17,
+    TissueLabel.TRICUSPID_LEAFLET: 19,
 }
 """Tissue to the entry of Matplotlib's `tab20`: blood in a full colour, its wall in a pale one."""
 

@@ -4,11 +4,10 @@ Coordinates are those of the probe: origin at the centre of the array, in the or
 """
 
 from dataclasses import dataclass
-from math import hypot
 
 import numpy as np
 
-from echotruth.config import Bmode, Probe, Rf
+from echotruth.config import Probe, Rf
 
 
 @dataclass(frozen=True)
@@ -81,12 +80,3 @@ def sample_positions(scan: Scan, range_: np.ndarray) -> tuple[np.ndarray, np.nda
     """Lateral and axial coordinates (lines, ranges), m, of the samples of all lines at ranges (ranges,), m."""
     lateral = scan.line_origin[:, None] + np.sin(scan.angle)[:, None] * range_
     return lateral, np.cos(scan.angle)[:, None] * range_
-
-
-def imaging_depth(rf: Rf, bmode: Bmode) -> float:
-    """Greatest range of a line within both the scan and the square field of view, m."""
-    side, half_angle = bmode.si().field_of_view, rf.si().sector / 2
-    if rf.scan == "linear":
-        return side
-    corner = np.arctan2(side / 2, side)
-    return side / np.cos(half_angle) if half_angle < corner else hypot(side, side / 2)

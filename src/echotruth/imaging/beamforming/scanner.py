@@ -7,12 +7,12 @@ from echotruth.imaging.beamforming.aperture import Aperture
 from echotruth.imaging.beamforming.gate import echo_time_range
 from echotruth.imaging.beamforming.receive import ReceiveFocus
 from echotruth.imaging.beamforming.resampling import line_resampling, range_resampling
-from echotruth.imaging.beamforming.scan import Scan, imaging_depth, sample_positions, scan_lines
+from echotruth.imaging.beamforming.scan import Scan, sample_positions, scan_lines
 from echotruth.imaging.beamforming.synthesis import TransmitSynthesis, channel_sampling
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES, Zone
 from echotruth.imaging.rf.full_matrix import FullMatrix
 
-__all__ = ["Scanner", "imaging_depth", "validate_scatterers"]
+__all__ = ["Scanner", "validate_scatterers"]
 
 
 class Scanner:
@@ -28,7 +28,7 @@ class Scanner:
     probe, rf
         The array, and its lines and transmits.
     depth
-        Greatest range, m; see :func:`imaging_depth`.
+        Greatest range, m.
 
     Attributes
     ----------

@@ -38,6 +38,8 @@ RIGHT_WIDTH, RIGHT_LENGTH, RIGHT_WALL, RIGHT_SHORTENING = 1.0, 0.85, 0.1, 0.4
 and the share of its width that it loses by end-systole."""
 ATRIAL_HEIGHT, ATRIAL_WALL = 1.35, 0.08
 """Height of the atria above the base and thickness of their walls, in R."""
+RIGHT_ATRIUM, RIGHT_ATRIAL_LENGTH = -pi / 6, 0.75
+"""Azimuth of the right atrium, rad, that of the four-chamber view, and half its length across it, in R."""
 LUNG_FADING_DB = 25.0
 """Fall of the echo of lung over R."""
 POSTERIOR_FADING_DB, POSTERIOR_NARROWNESS = 20.0, 4
@@ -161,11 +163,13 @@ class Anatomy:
         It is 0 within.
         """
         within = self._in_atria(position, ATRIAL_WALL * self.radius)
-        middles = self.base + np.array([[0.0, 0.0, 0.0], [self._right_atrium()[0], 0.0, 0.0]])
+        outwards = np.array([np.cos(RIGHT_ATRIUM), np.sin(RIGHT_ATRIUM), 0.0])
+        middles = self.base + np.stack([np.zeros(3), self.right_atrium[0] * outwards])
         from_middle = np.linalg.norm(position - middles[:, None], axis=2)
         return (from_middle * (1 - 1 / np.maximum(within, 1))).min(axis=0)
 
-    def _right_atrium(self) -> tuple[float, float]:
+    @property
+    def right_atrium(self) -> tuple[float, float]:
         """Middle of the right atrium and half its width, m, from the long axis outwards."""
         near = self.inner_radius + ATRIAL_WALL * self.radius
         return (self._septal_radius + near) / 2, (self._septal_radius - near) / 2
@@ -178,8 +182,10 @@ class Anatomy:
         x, y, z = (position - self.base).T
         height = self.roof - self.base[2] + thickness
         left = np.hypot(x, y) / (self.inner_radius + thickness)
-        middle, half = self._right_atrium()
-        right = np.hypot((x - middle) / (half + thickness), y / (self.radius + thickness))
+        middle, half = self.right_atrium
+        cos, sin = np.cos(RIGHT_ATRIUM), np.sin(RIGHT_ATRIUM)
+        length = RIGHT_ATRIAL_LENGTH * self.radius + thickness
+        right = np.hypot((cos * x + sin * y - middle) / (half + thickness), (cos * y - sin * x) / length)
         return np.cbrt(np.stack([left, right]) ** 3 + np.abs(z / height) ** 3)
 
 

@@ -14,11 +14,12 @@ from echotruth.imaging.medium.borders import Endocardium, Epicardium
 from echotruth.imaging.medium.mitral_valve import Leaflets
 from echotruth.imaging.medium.papillary_muscles import PapillaryMuscles
 from echotruth.imaging.medium.surroundings import Surroundings
+from echotruth.imaging.medium.tricuspid_valve import TricuspidLeaflets
 from echotruth.imaging.medium.wall import Wall
 
 BODIES: tuple[type[Body], ...] = (
     *(Endocardium, Epicardium, Blood, Surroundings),
-    *(Leaflets, AorticCusps, PapillaryMuscles),
+    *(Leaflets, AorticCusps, TricuspidLeaflets, PapillaryMuscles),
 )
 """What there may be besides the wall, in the order of the scatterers."""
 

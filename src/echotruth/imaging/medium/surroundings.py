@@ -12,7 +12,7 @@ from echotruth.config import Config
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import Floats
 from echotruth.heart import Heart
-from echotruth.imaging.beamforming.scan import Sector, imaging_depth, scan_lines
+from echotruth.imaging.beamforming.scan import Sector, scan_lines
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import (
     CAVITIES,
@@ -239,7 +239,7 @@ def outside_heart(heart: Heart, frame: int, position: Floats, *, column: bool = 
 
 def _drawn_evenly(config: Config, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Positions in the image (n, 3), m, and the density there, (n,), 1/m^3."""
-    start, depth = config.realism.surroundings.si().start, imaging_depth(config.rf, config.bmode)
+    start, depth = config.realism.surroundings.si().start, config.bmode.si().field_of_view
     scan, focus = scan_lines(config.probe, config.rf), config.rf.si().focus
     if depth <= start:
         return np.empty((0, 3)), np.empty(0)

@@ -25,10 +25,11 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.mitral_valve import MitralValve
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
 from echotruth.imaging.medium.surroundings import SurroundingsMotion, tissues
+from echotruth.imaging.medium.tricuspid_valve import TricuspidValve
 from echotruth.imaging.view import Plane
 
 Labels = NDArray[np.uint8]
-CavityPart = MitralValve | AorticValve | PapillaryMuscle
+CavityPart = MitralValve | AorticValve | TricuspidValve | PapillaryMuscle
 
 KNOTS = 65
 """Points along each side of the image at which the motion of what is around the heart is computed."""
@@ -156,6 +157,7 @@ class TissueImages:
         if levels.leaflets_dB is not None:
             bodies.append((TissueLabel.MITRAL_LEAFLET, MitralValve(self._heart)))
             bodies.append((TissueLabel.AORTIC_CUSP, AorticValve(self._heart)))
+            bodies.append((TissueLabel.TRICUSPID_LEAFLET, TricuspidValve(self._heart)))
         if levels.papillary_muscles_dB is not None:
             muscles = [PapillaryMuscle(self._heart, azimuth) for azimuth in AZIMUTHS]
             bodies += [(TissueLabel.PAPILLARY_MUSCLE, muscle) for muscle in muscles]

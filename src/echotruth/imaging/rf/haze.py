@@ -42,8 +42,8 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
     resolution = speed / 2 * sqrt(2) * log(2) / pi / spectral_width(probe)
     number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * h.mean_extra_range / resolution)
     deeper = random.exponential(h.mean_extra_range, number)
-    amplitude = random.standard_normal(number) * 10 ** (haze.level_dB / 20) / sqrt(number)
-    amplitude *= h.max_source_range / (h.max_source_range + deeper)
+    spread = h.max_source_range / (h.max_source_range + deeper)
+    amplitude = random.standard_normal(number) * 10 ** (haze.level_dB / 20) * spread / np.linalg.norm(spread)
     return np.column_stack([deeper, amplitude])[deeper < depth - h.max_source_range]
 
 
