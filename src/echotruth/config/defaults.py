@@ -97,7 +97,7 @@ REALISM_IMAGE: dict[str, Any] = {
     "bmode.dropout.edge_loss_dB": 14.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_GAIN_DB = {"mouse": -12.0, "human": -11.0}
+REALISM_GAIN_DB = {"mouse": -10.0, "human": -8.0}
 """`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
