@@ -18,7 +18,7 @@ from echotruth.arrays import Floats
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium import arc
-from echotruth.imaging.medium.annulus import Rim, Ring
+from echotruth.imaging.medium.annulus import Rim, Ring, box_of
 from echotruth.imaging.medium.aortic_root import valve_ring
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
@@ -70,8 +70,7 @@ class AorticValve:
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest coordinates, (3,), m, in the heart frame, that the cusps reach in any frame."""
         rings = [self.ring(frame) for frame in range(len(self.opening))]
-        middles, reach = np.stack([ring.middle for ring in rings]), 2 * max(ring.radius for ring in rings)
-        return middles.min(axis=0) - reach, middles.max(axis=0) + reach
+        return box_of(rings, np.array([-1.1, -1.1, -0.1]), np.array([1.1, 1.1, _length() + 0.1]))
 
     def cusp(self, frame: int, azimuth: Floats, share: Floats) -> Floats:
         """Points of the cusps in a frame, (n, 3), m, at azimuths (n,), rad, and shares (n,) of their length."""
@@ -83,8 +82,10 @@ class AorticValve:
         """Whether positions (n, 3), m, in the heart frame are in a cusp in a frame, (n,)."""
         place = self.ring(frame).to_ring(position)
         profile = np.column_stack([1 - np.hypot(place[:, 0], place[:, 1]), place[:, 2]]) / _length()
-        share, across = arc.inverse(*self._angles(frame), profile)
-        return (share > 0) & (share < 1) & (np.abs(across) * _length() < THICKNESS / 2)
+        inside: NDArray[np.bool_] = np.abs(profile - 0.5).max(axis=1) < 0.6
+        share, across = arc.inverse(*self._angles(frame), profile[inside])
+        inside[inside] = (share > 0) & (share < 1) & (np.abs(across) * _length() < THICKNESS / 2)
+        return inside
 
     def _angles(self, frame: int) -> tuple[float, float]:
         """Angles of a cusp above the annulus at base and edge in a frame, rad."""
