@@ -14,6 +14,7 @@ from echotruth.imaging.medium.annulus import ANTERIOR, Rim
 from echotruth.imaging.medium.aortic_root import aortic_tissue
 from echotruth.imaging.medium.aortic_valve import AorticCusps, AorticValve
 from echotruth.imaging.medium.blood import Cavity
+from echotruth.imaging.medium.medium import bodies
 from echotruth.imaging.medium.mitral_valve import ANNULUS, LEAFLETS, Leaflets, MitralValve, Part
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle, PapillaryMuscles
 from echotruth.imaging.medium.tissue_images import TissueImages
@@ -208,6 +209,17 @@ def test_the_aortic_root_is_seen_in_the_three_chamber_view_alone(heart, view, is
             )
             walls = np.flatnonzero(row == TissueLabel.AORTIC_WALL)
             assert atrium.max() < lumen.min() and walls.min() < lumen.min() and walls.max() > lumen.max()
+
+
+def test_there_are_no_cusps_without_a_root_and_no_chordae_without_papillary_muscles(heart):
+    alone = {"preset": "mouse", "neighbours": {"chambers_dB": None, "papillary_muscles_dB": None}}
+    config = Config.model_validate({"realism": alone, "views": {"preset": "echo"}})
+    assert {AorticCusps, PapillaryMuscles}.isdisjoint(bodies(config)) and Leaflets in bodies(config)
+    assert Part.CHORDA not in Leaflets.seed(scene(config, heart)).part
+    plane = imaging_plane(config.views["three_chamber"], config.rf, heart.endo_at_ed)
+    axial = (np.arange(200) + 0.5) * 14e-3 / 200
+    found = np.unique(TissueImages(config, heart, plane, axial, axial - 7e-3)(0))
+    assert TissueLabel.MITRAL_LEAFLET in found and TissueLabel.AORTIC_CUSP not in found
 
 
 def test_the_anterior_leaflet_is_beside_the_root(heart):
