@@ -14,6 +14,7 @@ from echotruth.imaging.medium.annulus import ANTERIOR, Rim
 from echotruth.imaging.medium.aortic_root import aortic_tissue
 from echotruth.imaging.medium.aortic_valve import AorticCusps, AorticValve
 from echotruth.imaging.medium.blood import Cavity
+from echotruth.imaging.medium.medium import bodies
 from echotruth.imaging.medium.mitral_valve import ANNULUS, LEAFLETS, Leaflets, MitralValve, Part
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle, PapillaryMuscles
 from echotruth.imaging.medium.tissue_images import TissueImages
@@ -71,10 +72,17 @@ def test_leaflets_meet_below_the_annulus_when_shut_and_leave_the_way_free_when_o
     edges = {side: valve.leaflet(SHUT, side, commissural, np.ones(19)) for side in LEAFLETS}
     np.testing.assert_allclose(edges[Part.ANTERIOR], edges[Part.POSTERIOR], atol=1e-9)
     assert (edges[Part.ANTERIOR][:, 2] < 0).all()
-    # They meet 5 to 8 mm below an annulus of 30.8 +- 4.4 mm from front to back, in people.
-    middle = {side: valve.leaflet(SHUT, side, np.zeros(2), np.array([0.0, 1.0])) for side in LEAFLETS}
-    diameter = middle[Part.ANTERIOR][0, 0] - middle[Part.POSTERIOR][0, 0]
-    assert 5 / 30.8 < -middle[Part.ANTERIOR][1, 2] / diameter < 8.1 / 30.8
+    # Of 748 adults, per height of the body: an annulus of 20 mm/m from front to back, tenting, lengths of both leaflets
+    # (PMC10257802, table 4), within a standard deviation.
+    share, hinges, lengths = np.linspace(0, 1, 201), [], []
+    for side in LEAFLETS:
+        line = valve.leaflet(SHUT, side, 0 * share, share)
+        hinges.append(line[0, 0])
+        lengths.append(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    diameter, depth = hinges[0] - hinges[1], -line[-1, 2]
+    assert depth / diameter == pytest.approx(5.8 / 20, abs=1.7 / 20)
+    assert lengths[0] / diameter == pytest.approx(16 / 20, abs=2 / 20)
+    assert lengths[1] / diameter == pytest.approx(9 / 20, abs=2 / 20)
     ends = [valve.leaflet(OPEN, side, np.zeros(1), np.ones(1))[0] for side in LEAFLETS]
     assert ends[0][0] - ends[1][0] > 0.9 * diameter and max(end[2] for end in ends) < -0.3 * diameter
 
@@ -202,6 +210,17 @@ def test_the_aortic_root_is_seen_in_the_three_chamber_view_alone(heart, view, is
             )
             walls = np.flatnonzero(row == TissueLabel.AORTIC_WALL)
             assert atrium.max() < lumen.min() and walls.min() < lumen.min() and walls.max() > lumen.max()
+
+
+def test_there_are_no_cusps_without_a_root_and_no_chordae_without_papillary_muscles(heart):
+    alone = {"preset": "mouse", "neighbours": {"chambers_dB": None, "papillary_muscles_dB": None}}
+    config = Config.model_validate({"realism": alone, "views": {"preset": "echo"}})
+    assert {AorticCusps, PapillaryMuscles}.isdisjoint(bodies(config)) and Leaflets in bodies(config)
+    assert Part.CHORDA not in Leaflets.seed(scene(config, heart)).part
+    plane = imaging_plane(config.views["three_chamber"], config.rf, heart.endo_at_ed)
+    axial = (np.arange(200) + 0.5) * 14e-3 / 200
+    found = np.unique(TissueImages(config, heart, plane, axial, axial - 7e-3)(0))
+    assert TissueLabel.MITRAL_LEAFLET in found and TissueLabel.AORTIC_CUSP not in found
 
 
 def test_the_anterior_leaflet_is_beside_the_root(heart):

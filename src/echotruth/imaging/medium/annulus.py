@@ -66,6 +66,13 @@ class Ring:
         return self.middle + self.radius * place @ self.axes
 
 
+def box_of(rings: list[Ring], low: Floats, high: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates, (3,), m, in the heart frame, of a box, (3,) to (3,), in coordinates of rings."""
+    corners = np.array(np.meshgrid(*np.stack([low, high]).T)).reshape(3, -1).T
+    reached = np.concatenate([ring.to_heart(corners) for ring in rings])
+    return reached.min(axis=0), reached.max(axis=0)
+
+
 class Rim:
     """The rim of the cavity in every frame.
 

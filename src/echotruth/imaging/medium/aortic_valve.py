@@ -9,16 +9,17 @@ revolution, angles and thickness were chosen by eye.
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, hypot, pi, radians
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium import arc
-from echotruth.imaging.medium.annulus import Rim, Ring
+from echotruth.imaging.medium.annulus import Rim, Ring, box_of
 from echotruth.imaging.medium.aortic_root import valve_ring
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
@@ -70,8 +71,7 @@ class AorticValve:
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest coordinates, (3,), m, in the heart frame, that the cusps reach in any frame."""
         rings = [self.ring(frame) for frame in range(len(self.opening))]
-        middles, reach = np.stack([ring.middle for ring in rings]), 2 * max(ring.radius for ring in rings)
-        return middles.min(axis=0) - reach, middles.max(axis=0) + reach
+        return box_of(rings, np.array([-1.1, -1.1, -0.1]), np.array([1.1, 1.1, _length() + 0.1]))
 
     def cusp(self, frame: int, azimuth: Floats, share: Floats) -> Floats:
         """Points of the cusps in a frame, (n, 3), m, at azimuths (n,), rad, and shares (n,) of their length."""
@@ -83,8 +83,10 @@ class AorticValve:
         """Whether positions (n, 3), m, in the heart frame are in a cusp in a frame, (n,)."""
         place = self.ring(frame).to_ring(position)
         profile = np.column_stack([1 - np.hypot(place[:, 0], place[:, 1]), place[:, 2]]) / _length()
-        share, across = arc.inverse(*self._angles(frame), profile)
-        return (share > 0) & (share < 1) & (np.abs(across) * _length() < THICKNESS / 2)
+        inside: NDArray[np.bool_] = np.abs(profile - 0.5).max(axis=1) < 0.6
+        share, across = arc.inverse(*self._angles(frame), profile[inside])
+        inside[inside] = (share > 0) & (share < 1) & (np.abs(across) * _length() < THICKNESS / 2)
+        return inside
 
     def _angles(self, frame: int) -> tuple[float, float]:
         """Angles of a cusp above the annulus at base and edge in a frame, rad."""
@@ -107,6 +109,11 @@ class AorticCusps(CavityBody):
     name, level = "aortic_cusps", "neighbours.leaflets_dB"
     place: Floats
     amplitude: Floats
+
+    @classmethod
+    def level_dB(cls, config: Config) -> Any:
+        """As of the mitral leaflets, if there are chambers, of which the aortic root is one."""
+        return None if config.realism.neighbours.chambers_dB is None else super().level_dB(config)
 
     @classmethod
     def seed(cls, scene: Scene) -> Self:

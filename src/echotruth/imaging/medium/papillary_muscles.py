@@ -7,9 +7,9 @@ adults muscles are 19 +- 4 and 22 +- 4 mm long (Anatomical variations of mitral 
 College) and shorten by 21 +- 9 % (anterolateral) and 17 +- 6 % (posteromedial) from end-diastole to end-systole (Madu
 et al., Med Sci Monit 7 (2001) CR1212).
 
-The anterolateral one is between the anterolateral and the inferolateral wall, at three o'clock in a short axis, and
-the posteromedial one at the inferior wall, at six o'clock, a right angle apart. So four- and two-chamber view show a
-finger, and the three-chamber view lies between both. Azimuths, depths, widths and shape were chosen by eye.
+The anterolateral one is at the anterolateral wall, at half past two o'clock in a short axis, and the posteromedial one
+at the inferior wall, at six o'clock. So four- and two-chamber view show a finger, and the three-chamber view lies
+between both. Azimuths, depths, widths and shape were chosen by eye.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ from echotruth.imaging.medium.anatomy import sampled
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.body import CavityBody, Scene
 
-AZIMUTHS = (0.94 * pi, 1.48 * pi)
+AZIMUTHS = (0.9 * pi, 1.47 * pi)
 """Of the anterolateral and of the posteromedial muscle, rad."""
 ROOT, TIP = 0.64, 0.36
 """Depth of root and tip below the base, over the length of the cavity."""

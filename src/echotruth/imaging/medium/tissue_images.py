@@ -20,7 +20,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import FOLLOWING_BASE, above_lid
-from echotruth.imaging.medium.aortic_valve import AorticValve
+from echotruth.imaging.medium.aortic_valve import AorticCusps, AorticValve
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.mitral_valve import MitralValve
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
@@ -156,6 +156,7 @@ class TissueImages:
         bodies: list[tuple[TissueLabel, CavityPart]] = []
         if levels.leaflets_dB is not None:
             bodies.append((TissueLabel.MITRAL_LEAFLET, MitralValve(self._heart)))
+        if AorticCusps.level_dB(self._config) is not None:
             bodies.append((TissueLabel.AORTIC_CUSP, AorticValve(self._heart)))
             bodies.append((TissueLabel.TRICUSPID_LEAFLET, TricuspidValve(self._heart)))
         if levels.papillary_muscles_dB is not None:
