@@ -94,10 +94,10 @@ REALISM_IMAGE: dict[str, Any] = {
     "bmode.dynamic_range_dB": 50.0,
     "bmode.grey_gamma": 1.3,
     "bmode.smoothing": 0.65,
-    "bmode.dropout.edge_loss_dB": 14.0,
+    "bmode.dropout.edge_loss_dB": 16.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_GAIN_DB = {"mouse": -10.0, "human": -8.0}
+REALISM_GAIN_DB = {"mouse": -10.0, "human": -8.5}
 """`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
