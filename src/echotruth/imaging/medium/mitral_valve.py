@@ -10,6 +10,7 @@ scatterers lie on their middle surfaces and have equal amplitudes, which add up 
 and not where it is oblique (:mod:`echotruth.imaging.medium.borders`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import pi
@@ -44,10 +45,15 @@ class MitralValve:
     Parameters
     ----------
     heart : Heart
+    between : sequence of float
+        As of :class:`echotruth.imaging.medium.body.Scene`. Between frames the opening is linear.
     """
 
-    def __init__(self, heart: Heart) -> None:
-        self._heart, self.opening = heart, opening(volumes(heart))
+    def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
+        cycle = len(heart.displacement) - len(between)
+        of_frames = opening(volumes(heart)[:cycle])
+        of_others = np.interp(np.asarray(between), np.arange(cycle), of_frames, period=cycle)
+        self._heart, self.opening = heart, np.append(of_frames, of_others)
 
     def hinge(self, frame: int) -> tuple[Floats, float, float]:
         """Centre (3,), m, and radius, m, of the rim, and angle of the leaflets below the base, rad, in a frame."""
@@ -123,7 +129,7 @@ class Leaflets(CavityBody):
 
     @cached_property
     def _valve(self) -> MitralValve:
-        return MitralValve(self.scene.heart)
+        return MitralValve(self.scene.heart, self.scene.between)
 
 
 def _length(side: Floats | int, chord: Floats) -> Floats:
