@@ -128,3 +128,10 @@ def test_leaflets_open_between_frames_as_they_do_from_frame_to_frame():
     np.testing.assert_allclose(leaflets.in_heart(FRAMES), leaflets.in_heart(8), atol=1e-12)
     heart, step = imaged.moving.at(imaged.moving.time[[8, 9]].mean(keepdims=True)), [8.5]
     assert MitralValve(heart, step).opening[-1] == pytest.approx(clip[8:10].mean())
+
+
+def test_a_slow_packet_of_the_first_frame_decorrelates_too():
+    imaged = Imaged(**{"realism.decorrelation.time_ms": 20.0})
+    slow = PacketSequence(imaged.config, imaged.moving, imaged.plane, imaged.random, 3, 0.03).medium(0)
+    first, second = (slow(FRAMES + pulse)[1] for pulse in range(2))
+    assert np.corrcoef(first, second)[0, 1] == pytest.approx(np.exp(-1.5), abs=0.03)

@@ -7,6 +7,7 @@ centre frequency of the probe, because a beam is wider, and so holds more scatte
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,8 @@ from echotruth.imaging.bmode import ScanConversion
 GATE_STD = 1.5
 """Standard deviation over range of the Gaussian gate over which autocorrelations are averaged, wavelengths."""
 
-Autocorrelation = NDArray[np.complex64]
+Autocorrelation = NDArray[np.complexfloating[Any, Any]]
+Image = NDArray[np.floating[Any]]
 
 
 @dataclass(frozen=True)
@@ -53,7 +55,7 @@ class Estimator:
         over_range = np.mean(lines[..., :-1].conj() * lines[..., 1:], axis=0)
         return self._gated(over_pulses), self._gated(np.pad(over_range, ((0, 0), (0, 1)), mode="edge"))
 
-    def velocity(self, over_pulses: Autocorrelation, over_range: Autocorrelation) -> tuple[Floats, Floats]:
+    def velocity(self, over_pulses: Autocorrelation, over_range: Autocorrelation) -> tuple[Image, Image]:
         """Velocity towards the probe, m/s, and the Nyquist velocity c / (4 f T), of autocorrelations of one shape.
 
         With the local frequency f and the interval T, the phase between pulses is pi times the velocity over that of
@@ -71,9 +73,7 @@ class Estimator:
         return gated
 
 
-def velocity_images(
-    estimator: Estimator, lines: NDArray[np.complex64], convert: ScanConversion
-) -> tuple[Floats, Floats]:
+def velocity_images(estimator: Estimator, lines: NDArray[np.complex64], convert: ScanConversion) -> tuple[Image, Image]:
     """Velocity towards the probe and Nyquist velocity, m/s, at every pixel (axial, lateral), of a packet of lines.
 
     Autocorrelations, which have no jump where velocities wrap, are interpolated. Outside the scan there is NaN.

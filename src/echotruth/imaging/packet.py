@@ -119,12 +119,12 @@ class PacketSequence:
         return np.stack([self.scanner.beamform(record) for record in records])
 
     def medium(self, frame: int) -> Medium:
-        """Scatterers in the frames of the clip, whose times are a cycle earlier, and in the pulses of a packet."""
+        """Scatterers in the frames of the clip and, after these, in the pulses of a packet."""
         heart = self._heart
         time = heart.time[frame] + self._interval * (np.arange(self._pulses) - (self._pulses - 1) / 2)
         between = tuple(time / (heart.time[1] - heart.time[0]))
-        # A cycle later, so that the time of random processes goes on.
-        times = np.append(heart.time, heart.period + time)
+        # For random processes, which go on in time, the first pulse is that of the next cycle, whatever its frame.
+        times = np.append(heart.time, heart.period + time - time[0])
         scene = Scene(self._config, heart.at(time), self._plane, self._of_packet(frame), times, between)
         return Medium(scene, self._scatterers)
 

@@ -85,7 +85,7 @@ def velocity(
     >>> import echotruth as et
     >>> demo = et.Repository("out/demo")
     >>> heart, clip = demo.heart(), demo.clip(view="mid", size=128)
-    >>> found = et.velocity(heart, clip, frames=[5], packet=3)
+    >>> found = et.velocity(heart, clip, frames=[1], packet=2)
     >>> error = (found["velocity"] - found["true_velocity"]) / found["nyquist"]
     >>> bool(abs(error.mean()) < 0.02)
     True
