@@ -2,8 +2,9 @@
 
 Loupas, Powers, Gill 1995, IEEE Trans Ultrason Ferroelectr Freq Control 42:672. The phase by which echoes turn from
 pulse to pulse is that of their autocorrelation over pulses, as of Kasai et al. 1985, IEEE Trans Sonics Ultrason 32:458;
-the frequency that belongs to it is that of the echoes there, from their autocorrelation over range. It is below the
-centre frequency of the probe, because a beam is wider, and so holds more scatterers, at low frequencies.
+the frequency that belongs to it is that of the echoes there, from their autocorrelation over range. In tissue it is
+below the centre frequency of the probe: at low frequencies a beam is wider, and so holds more scatterers, and elements
+see more of what is aside.
 """
 
 from dataclasses import dataclass
