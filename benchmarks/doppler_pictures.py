@@ -39,8 +39,6 @@ SPECIES, VIEWS = ("mouse", "human"), ("mid", "four_chamber")
 PACKET = 3
 TABULATED = (9, 26, 36)
 """Frames of the table: in systole, in early filling and in that by the atria."""
-MEASURED = range(0, FRAMES, 2)
-"""Frames of the picture."""
 FROM_BORDER = 3
 """Least distance from the border of the wall of pixels in the table, wavelengths."""
 SLOW = 0.3
@@ -128,9 +126,8 @@ def draw(heart: et.Heart) -> Figure:
     """Draw measured, true and aliased velocity of one frame, and the velocity of the septal base over the cycle."""
     imaged = Imaged(heart, "four_chamber")
     clip = imaged.clip()
-    found = et.velocity(heart, clip, MEASURED, packet=PACKET)
-    measured = clip.sel(frame=found["frame"])
-    base = found.where((measured["segment"] == SEGMENT) & (abs(measured["wall_depth"] - 0.5) < MIDDLE))
+    found = et.velocity(heart, clip, packet=PACKET)
+    base = found.where((clip["segment"] == SEGMENT) & (abs(clip["wall_depth"] - 0.5) < MIDDLE))
     curves = 100 * base.mean(["axial", "lateral"])
     early = int(curves["true_velocity"].idxmin())
     aliased = et.velocity(heart, clip, [early], packet=PACKET, prf_Hz=SLOW * found.attrs["prf_Hz"])
@@ -173,7 +170,8 @@ def _curve(axes: Axes, curves: xr.Dataset) -> None:
     axes.plot(time, true, color=style.TRUTH, label="true")
     axes.plot(time, curves["velocity"].values, "o", ms=4, color=style.SERIES[1], label="measured")
     systole, early = int(true.argmax()), int(true.argmin())
-    late = early + 3 + int(true[early + 3 :].argmin())
+    diastasis = early + int(true[early:].argmax())
+    late = diastasis + int(true[diastasis:].argmin())
     for name, frame, side in (("s'", systole, 1), ("e'", early, -1), ("a'", late, -1)):
         offset = {"xytext": (0, 9 * side), "textcoords": "offset points", "ha": "center", "va": "center"}
         axes.annotate(name, (time[frame], true[frame]), **offset)

@@ -8,13 +8,15 @@ see more of what is aside.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.config import Probe
 from echotruth.imaging.beamforming.scan import Linear, Scan
+from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import ScanConversion
 
 GATE_STD = 1.5
@@ -43,6 +45,12 @@ class Estimator:
     sound_speed: float
     range_step: float
     interval: float
+
+    @classmethod
+    def of(cls, probe: Probe, scanner: Scanner, interval: float) -> Self:
+        """The autocorrelator of the lines of a scanner."""
+        step = float(scanner.range[1] - scanner.range[0])
+        return cls(scanner.frequency, probe.si().sound_speed, step, interval)
 
     def autocorrelations(self, lines: NDArray[np.complex64]) -> tuple[Autocorrelation, Autocorrelation]:
         """Autocorrelations of the lines of a packet (pulses, lines, ranges), averaged over pulses and the gate.

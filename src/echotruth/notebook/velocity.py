@@ -94,29 +94,25 @@ def velocity(
     check_clip(clip)
     case, (_, plane), view = case_of(clip), imaged_heart(clip, heart), clip.attrs["view"]
     check_whole(clip, case.config)
-    config, chosen = case.config, _chosen(frames, len(heart.displacement))
+    config, size = case.config, clip.sizes["axial"]
+    chosen, images = _chosen(frames, len(heart.displacement)), []
     moving, scan = MovingHeart(heart, config, plane, view), scan_lines(config.probe, config.rf)
-    interval = 1 / _prf(config, packet, moving, scan, prf_Hz)
-    pixels = pixel_centres(config.bmode, clip.sizes["axial"])
-    bmode, images = config.bmode.model_copy(update={"size_px": clip.sizes["axial"]}), []
     with progress_line("velocity", progress):
-        sequence = PacketSequence(config, moving, plane, partial(generator, case, view), packet, interval)
-        scanner = sequence.scanner
-        convert = ScanConversion(scan, scanner.range, bmode)
-        c, step = config.probe.si().sound_speed, scanner.range[1] - scanner.range[0]
-        estimator = Estimator(scanner.frequency, c, step, interval)
+        prf = _prf(config, packet, moving, scan, prf_Hz)
+        sequence = PacketSequence(config, moving, plane, partial(generator, case, view), packet, 1 / prf)
+        convert = ScanConversion(scan, sequence.scanner.range, config.bmode.model_copy(update={"size_px": size}))
+        estimator, pixels = Estimator.of(config.probe, sequence.scanner, 1 / prf), pixel_centres(config.bmode, size)
         for number, frame in enumerate(chosen):
-            images.append(velocity_images(estimator, sequence.lines(frame), convert))
+            measured = velocity_images(estimator, sequence.lines(frame), convert)
+            images.append((*measured, true_velocity(moving, scan, frame, *pixels)))
             logger.info("frame %d of %d", number + 1, len(chosen))
-    true = [true_velocity(moving, scan, frame, *pixels) for frame in chosen]
-    values = dict(zip(VARIABLES, (*zip(*images, strict=True), true), strict=True))
     return xr.Dataset(
         {
-            name: (("frame", "axial", "lateral"), np.stack(each).astype(np.float32), VARIABLES[name])
-            for name, each in values.items()
+            name: (("frame", "axial", "lateral"), np.stack(each).astype(np.float32), about)
+            for (name, about), each in zip(VARIABLES.items(), zip(*images, strict=True), strict=True)
         },
         {"frame": chosen, "axial": clip["axial"], "lateral": clip["lateral"]},
-        clip.attrs | {"packet": packet, "prf_Hz": 1 / interval},
+        clip.attrs | {"packet": int(packet), "prf_Hz": prf},
     ).assign_coords(time=clip["time"].sel(frame=chosen))
 
 
