@@ -98,7 +98,12 @@ def test_realistic_echoes_of_a_beating_heart_have_its_velocity():
     """The heart with an infarct that comes with the package, in noise, blood and surroundings."""
     sample = et.sample()
     clip = sample.clip("infarct", "mid", variables=("mask", "wall_depth"))
-    realistic = {"preset": "mouse", "neighbours": {"chest_wall_dB": None, "lung_dB": None}}
+    realistic = {
+        "noise": {"snr_dB": 40.0},
+        "decorrelation": {"time_ms": 500.0},
+        "blood": {"level_dB": -16.5, "density": 0.15},
+        "surroundings": {"level_dB": -11.0, "density": 0.15},
+    }
     coarse = {"rf.lines": 48, "probe.elements": 32, "phantom.density_per_mm3": 800.0}
     config = et.configure(sample.case("infarct").config, realism=realistic, **coarse)
     heart = sample.heart("infarct")
