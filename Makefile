@@ -55,8 +55,9 @@ test-integration: .venv-integration/ready
 docs: .venv-integration/ready  ## the site, in out/site
 	.venv-integration/bin/python -m sphinx -W --keep-going -b html -c docs . out/site
 
-pictures: .venv/ready  ## of docs/physiology.md and docs/strain.md
+pictures: .venv/ready  ## of docs/physiology.md, docs/strain.md and docs/doppler.md
 	$(BIN)/python benchmarks/physiology_pictures.py
+	$(BIN)/python benchmarks/doppler_pictures.py
 	$(BIN)/echotruth run benchmarks/default.yaml
 	$(BIN)/python benchmarks/default_pictures.py out/default
 

@@ -19,6 +19,7 @@ from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
 from .notebook.sensitivities import sensitivities
 from .notebook.simulation import beat, evaluate, image, systole, track
+from .notebook.velocity import velocity
 from .repository.reader import Repository, sample
 from .sharing.fetching import fetch
 from .tracking.failure import TrackerFailed
@@ -58,4 +59,5 @@ __all__ = [
     "strain_peaks",
     "systole",
     "track",
+    "velocity",
 ]

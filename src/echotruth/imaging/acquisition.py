@@ -11,6 +11,7 @@ from echotruth.config import Config
 from echotruth.imaging.beamforming.aperture import Aperture, harmonic
 from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner, validate_scatterers
+from echotruth.imaging.medium.body import Echoes
 from echotruth.imaging.medium.medium import Medium
 from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.rf.aberration import delays, phasors
@@ -52,7 +53,11 @@ class Acquisition:
 
     def __call__(self, frame: int) -> np.ndarray:
         """Spectra of the record of all pairs in a frame, (bins, elements, elements), as from :class:`FullMatrix`."""
-        record = self.echoes(*validate_scatterers(*self._medium(frame)))
+        return self.record(self._medium(frame), frame)
+
+    def record(self, scatterers: Echoes, frame: int | str) -> np.ndarray:
+        """Record of scatterers with the noise of a frame, or of what has another name."""
+        record = self.echoes(*validate_scatterers(*scatterers))
         if self.noise:
             record += np.float32(self.noise) * self.unit_noise(frame)
         return record
@@ -78,7 +83,7 @@ class Acquisition:
             matrix *= factor
         return matrix
 
-    def unit_noise(self, frame: int) -> np.ndarray:
+    def unit_noise(self, frame: int | str) -> np.ndarray:
         """Noise of variance 1 in the records of all pairs in a frame, at the frequencies of the matrix.
 
         White over the pairs and over the band of the pulse, to which a receiver is tuned; none outside the band.

@@ -121,12 +121,17 @@ class ScanConversion:
 
     def __call__(self, envelopes: np.ndarray) -> np.ndarray:
         """Image (axial, lateral) of the envelopes (lines, ranges), float32; 0 outside the scan, never negative."""
-        image, values = np.zeros(self._shape, np.float32), np.empty(len(self._inside), np.float32)
-        padded = spline.coefficients(np.ascontiguousarray(envelopes, np.float32))
-        spline.evaluate(padded, self._line, self._sample, values)
+        image = np.zeros(self._shape, np.float32)
         # The spline may undershoot beside an edge; an envelope is not negative.
-        image.ravel()[self._inside] = np.maximum(values, 0)
+        image.ravel()[self._inside] = np.maximum(self.interpolated(envelopes), 0)
         return image
+
+    def interpolated(self, samples: np.ndarray) -> np.ndarray:
+        """Values of samples (lines, ranges) at the pixels within the scan, in their order, float32."""
+        values = np.empty(len(self._inside), np.float32)
+        padded = spline.coefficients(np.ascontiguousarray(samples, np.float32))
+        spline.evaluate(padded, self._line, self._sample, values)
+        return values
 
 
 def log_compress(images: np.ndarray, dynamic_range_dB: float, gain_dB: float = 0.0) -> np.ndarray:

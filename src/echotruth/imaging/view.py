@@ -122,7 +122,7 @@ def before_probe(heart: Heart, config: Config, view: str) -> tuple[Heart, Plane]
     return moved(heart, plane, config.views[view].motion, config.loop), plane
 
 
-def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop) -> Heart:
+def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop, time: Floats | None = None) -> Heart:
     """A heart with the rigid motion relative to the probe on top of its own.
 
     A position x in the image becomes R(t) x + d(t), where R is a rotation about the middle of the array, and d a
@@ -134,7 +134,8 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop) -> Heart:
     plane : Plane
     motion : ViewMotion
     loop : Loop
-        Its frames are those of the heart.
+    time : ndarray of shape (frame,), s, optional
+        Times of the frames of the heart. Default: those of the loop.
 
     Returns
     -------
@@ -143,7 +144,7 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop) -> Heart:
     if motion == ViewMotion():
         return heart
     beat, si = period(loop), motion.si()
-    time = frame_times(loop)[: len(heart.displacement)]
+    time = frame_times(loop)[: len(heart.displacement)] if time is None else time
     angle = si.rocking * raised_cosine(2 * np.pi * time / beat)
     shift = np.outer(time / beat, _vector(motion.drift))
     shift += np.outer(inspiration(motion.breathing, time, beat), _vector(motion.breathing))

@@ -50,7 +50,7 @@ CODE = {
 """Folders and modules of the package on which a stage depends; the configuration and the repository pass numbers on,
 but for their rounding."""
 
-NO_RF = ("imaging/bmode.py", "imaging/truth.py", "imaging/flow.py", "imaging/tracks.py")
+NO_RF = tuple(f"imaging/{name}.py" for name in ("bmode", "truth", "flow", "tracks", "doppler", "packet"))
 """Modules of imaging that phantom and rf do not use."""
 
 BEFORE = {

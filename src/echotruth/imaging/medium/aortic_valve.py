@@ -6,6 +6,7 @@ mitral leaflets do. Adults have cusps some 17 to 20 mm high; here they are 16 mm
 revolution, angles and thickness were chosen by eye.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, hypot, pi, radians
@@ -23,7 +24,7 @@ from echotruth.imaging.medium.annulus import Rim, Ring, box_of
 from echotruth.imaging.medium.aortic_root import valve_ring
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
-from echotruth.imaging.medium.filling import aortic_opening, volumes
+from echotruth.imaging.medium.filling import aortic_opening, course
 from echotruth.imaging.medium.mitral_valve import DENSITY
 from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
@@ -52,10 +53,12 @@ class AorticValve:
     Parameters
     ----------
     heart : Heart
+    between : sequence of float
+        As of :class:`echotruth.imaging.medium.body.Scene`.
     """
 
-    def __init__(self, heart: Heart) -> None:
-        self.opening = aortic_opening(volumes(heart))
+    def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
+        self.opening = course(aortic_opening, heart, between)
         self._azimuth = np.linspace(0, 2 * pi, POINTS, endpoint=False)
         points = valve_ring(Rim(heart)(0), self._azimuth)
         # With the base, as the root does; a decay length has no part in that.
@@ -133,7 +136,7 @@ class AorticCusps(CavityBody):
 
     @cached_property
     def _valve(self) -> AorticValve:
-        return AorticValve(self.scene.heart)
+        return AorticValve(self.scene.heart, self.scene.between)
 
 
 def _length() -> float:

@@ -38,6 +38,8 @@ class Scene:
     random : Random
         Makes a generator of random numbers for each purpose.
     time : ndarray of shape (frame,), s
+    between : tuple of float
+        Frames of the heart that come after those of the cycle, as fractional numbers of these.
     """
 
     config: Config
@@ -45,6 +47,7 @@ class Scene:
     plane: Plane
     random: Random
     time: Floats
+    between: tuple[float, ...] = ()
 
     def fading(self, amplitude: Floats, name: str) -> Callable[[int], Floats]:
         """Amplitudes (n,) of a body by frame: constant, or decorrelating."""

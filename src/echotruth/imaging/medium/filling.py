@@ -1,5 +1,7 @@
 """Filling of the left ventricle, frame by frame: how far it is emptied, and how far its valves are open."""
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 
 from echotruth.arrays import Floats
@@ -44,6 +46,16 @@ def opening(volume: Floats) -> Floats:
 def aortic_opening(volume: Floats) -> Floats:
     """How far the aortic valve is open, (frame,), 0 to 1: as :func:`opening`, by the rate of emptying."""
     return _opened(volume, volume - np.roll(volume, -1))
+
+
+def course(of_volumes: Callable[[Floats], Floats], heart: Heart, between: Sequence[float] = ()) -> Floats:
+    """What follows from the volumes of a cycle, such as :func:`opening`, in all frames of a heart, (frame,).
+
+    Frames that come after those of the cycle, at fractional numbers of these, are linear between them.
+    """
+    cycle = len(heart.displacement) - len(between)
+    of_frames = of_volumes(volumes(heart)[:cycle])
+    return np.append(of_frames, np.interp(np.asarray(between), np.arange(cycle), of_frames, period=cycle))
 
 
 def _opened(volume: Floats, rate: Floats) -> Floats:

@@ -15,6 +15,7 @@ probe and not where it is oblique (:mod:`echotruth.imaging.medium.borders`). The
 uneven thickness and their edges rough. Annulus and chordae scatter as muscle does.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -30,7 +31,7 @@ from echotruth.imaging.medium import arc
 from echotruth.imaging.medium.annulus import Rim, annulus_distance, box_of, hinge, span
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
-from echotruth.imaging.medium.filling import opening, volumes
+from echotruth.imaging.medium.filling import course, opening
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
 
 MEETING, TENTING = 2 / 3, 0.28
@@ -88,10 +89,12 @@ class MitralValve:
     Parameters
     ----------
     heart : Heart
+    between : sequence of float
+        As of :class:`echotruth.imaging.medium.body.Scene`. Between frames the opening is linear.
     """
 
-    def __init__(self, heart: Heart) -> None:
-        self.rim, self.opening = Rim(heart), opening(volumes(heart))
+    def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
+        self.rim, self.opening = Rim(heart), course(opening, heart, between)
 
     @property
     def box(self) -> tuple[Floats, Floats]:
@@ -212,7 +215,7 @@ class Leaflets(CavityBody):
 
     @cached_property
     def _valve(self) -> MitralValve:
-        return MitralValve(self.scene.heart)
+        return MitralValve(self.scene.heart, self.scene.between)
 
     @cached_property
     def _muscles(self) -> list[PapillaryMuscle]:

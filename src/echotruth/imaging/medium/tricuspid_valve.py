@@ -7,6 +7,7 @@ They follow the base. In people the septal leaflet is hinged up to 8 mm per m^2 
 the mitral valve; here the whole annulus is, by 5 mm. All lengths and angles were chosen by eye.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, hypot, pi, radians
@@ -23,7 +24,7 @@ from echotruth.imaging.medium.anatomy import RIGHT_ATRIUM, Anatomy
 from echotruth.imaging.medium.annulus import Ring
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
-from echotruth.imaging.medium.filling import opening, volumes
+from echotruth.imaging.medium.filling import course, opening
 from echotruth.imaging.medium.mitral_valve import DENSITY
 from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
@@ -49,10 +50,12 @@ class TricuspidValve:
     Parameters
     ----------
     heart : Heart
+    between : sequence of float
+        As of :class:`echotruth.imaging.medium.body.Scene`.
     """
 
-    def __init__(self, heart: Heart) -> None:
-        self.opening, anatomy = opening(volumes(heart)), Anatomy(heart)
+    def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
+        self.opening, anatomy = course(opening, heart, between), Anatomy(heart)
         distance, radius = anatomy.right_atrium
         self._azimuth = np.linspace(0, 2 * pi, POINTS, endpoint=False)
         angle = self._azimuth + RIGHT_ATRIUM
@@ -138,7 +141,7 @@ class TricuspidLeaflets(CavityBody):
 
     @cached_property
     def _valve(self) -> TricuspidValve:
-        return TricuspidValve(self.scene.heart)
+        return TricuspidValve(self.scene.heart, self.scene.between)
 
 
 def _length() -> float:
