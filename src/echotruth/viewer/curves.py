@@ -105,7 +105,7 @@ def strain_name(clip: Clip, component: str) -> str:
     """A strain in words, as echocardiography has it."""
     plane = "short_axis" if clip.is_short_axis else "long_axis"
     direction = style.QUANTITIES[style.ALONG[plane]].words.lower()
-    names = {LINE: f"{style.GLOBAL[plane]}, {direction} of a contour", "RR": "radial strain", "TT": direction}
+    names = {LINE: f"{style.GLOBAL[plane]}, strain of a contour", "RR": "radial strain", "TT": direction}
     return (names | {"RT": "shear"})[component]
 
 

@@ -124,7 +124,7 @@ class Panel:
         self.palette.data = dict(zip(("red", "green", "blue"), rgb.astype(np.float32).T.copy(), strict=True))
         self.names.data = {"name": ["", *tint.names.values()]}
         self.bar.color_mapper.update(palette=tint.palette, low=tint.low, high=tint.high)
-        self.bar.ticker.ticks = list(tint.names) or MaxNLocator(6).tick_values(tint.low, tint.high)
+        self.bar.ticker.ticks = list(tint.names) or MaxNLocator(6, steps=(1, 2, 5, 10)).tick_values(tint.low, tint.high)
         self.bar.update(title=tint.title, visible=True, major_label_overrides=tint.names)
         self.colour.data = {"index": [tint.index]}
 
