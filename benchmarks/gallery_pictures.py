@@ -31,10 +31,10 @@ HEIGHT = 400
 """Of the clip, px."""
 VIEW, ACROSS, STEP = "long_axis", 26, 1.0
 """View of the picture of flow; arrows along its side, and how many times as long as the motion they are."""
-REPORT, VIEWER = (1280, 1000), (1500, 860)
+REPORT, VIEWER = (1280, 1000), (1280, 860)
 """Sizes of the windows, px."""
-ADDRESS = "?view=long_axis&colour=tracked_strain&other=truth&frame={es}"
-"""What the viewer shows: strain as it was tracked beside what is true."""
+ADDRESS = "?frame={es}"
+"""What the viewer shows: what it opens with, at end-systole."""
 
 
 @style.styled

@@ -88,8 +88,8 @@ def draw(pictures: Mapping[str, Sequence[xr.Dataset]], places: Mapping[str, Wher
             panel = figure.add_subplot(grid[row, column])
             _image(panel, picture, side)
             panel.set(xlim=(left, right), ylim=(bottom, top))
-            panel.set(**({"xlabel": "Lateral (mm)"} if row == 2 else {"xticklabels": []}))
-            panel.set(**({"ylabel": "Depth (mm)"} if column == 0 else {"yticklabels": []}))
+            panel.tick_params(labelbottom=row == 2, labelleft=column == 0)
+            panel.set(xlabel="Lateral (mm)" if row == 2 else "", ylabel="" if column else "Depth (mm)")
             panel.text(0.04, 0.97, name, color=style.ON_IMAGE, va="top", fontweight="bold", transform=panel.transAxes)
     return figure
 
@@ -97,8 +97,8 @@ def draw(pictures: Mapping[str, Sequence[xr.Dataset]], places: Mapping[str, Wher
 def _place(axes: Axes, place: Where) -> None:
     """Draw a section of the wall, and the view in it as a line."""
     axes.add_collection(LineCollection(list(place.wall), colors=style.INK, linewidths=1.2))
-    along = np.array([-place.normal[1], place.normal[0]])
-    axes.axline(place.point, place.point + along, color=style.BORDER, linewidth=2.4)
+    (x, y), (right, up) = place.point.tolist(), place.normal.tolist()
+    axes.axline((x, y), (x - up, y + right), color=style.BORDER, linewidth=2.4)
     low, high = place.wall.min((0, 1)), place.wall.max((0, 1))
     margin = 0.12 * (high - low).max()
     axes.set(xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin), aspect="equal")
