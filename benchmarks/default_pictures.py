@@ -11,11 +11,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
 import report
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from physiology_pictures import save
 
 import echotruth as et
@@ -24,14 +24,14 @@ from echotruth.report.figures import Figures
 
 SIZE, TRACKER = 512, "bspline_dic"
 CONTOURS = dict(zip(("endocardial", "middle", "epicardial"), style.layer_colours(3), strict=True))
-ROTATIONS = {"base": style.BASE, "apex": style.APEX}
+ROTATIONS = ("base", "apex")
 MEANS = ("gls", "gls_endocardial", "gcs", "gcs_endocardial", "radial", "twist")
 """Quantities of the table, of the heart as a whole."""
 
 
 def _pair(axes: Axes, curves: xr.Dataset, name: str, label: str, colour: str) -> None:
     """A curve as it is (solid) and as it was tracked (dashed); rotation in degrees, strain in percent."""
-    factor = 100 if name == "line_strain" else np.degrees(1)
+    factor = style.FACTORS["%" if name == "line_strain" else "°"]
     time = 1e3 * curves["time"].values
     axes.plot(time, factor * curves[f"true_{name}"].values, color=colour, label=label)
     axes.plot(time, factor * curves[f"tracked_{name}"].values, color=colour, ls="--")
@@ -40,17 +40,18 @@ def _pair(axes: Axes, curves: xr.Dataset, name: str, label: str, colour: str) ->
 @style.styled
 def draw_strain(repository: et.Repository) -> Figure:
     """Draw strain of the contours in a short and in the long axis, and rotation and twist."""
-    figure = style.figure(9.0, 3.4)
+    figure = style.figure(9.0, 3.7)
     panels = figure.subplots(1, 3)
     curves = {view: repository.curves(view=view, tracker=TRACKER, size=SIZE) for view in repository.views}
     for axes, view in zip(panels, ("mid", "long_axis"), strict=False):
         for contour, colour in CONTOURS.items():
             _pair(axes, curves[view].sel(contour=contour), "line_strain", contour, colour)
-    for view, colour in ROTATIONS.items():
-        _pair(panels[2], curves[view], "rotation", view, colour)
-    _pair(panels[2], repository.twist(tracker=TRACKER, size=SIZE), "twist", "twist", style.TWIST)
-    titles = "Circumferential, mid short axis", "Longitudinal, long axis", "Rotation and twist"
-    labels = "Line strain (%)", "Line strain (%)", "Counter-clockwise from apex (deg)"
+    for view in ROTATIONS:
+        _pair(panels[2], curves[view], "rotation", view, style.QUANTITIES[view].colour)
+    twist = repository.twist(tracker=TRACKER, size=SIZE)
+    _pair(panels[2], twist, "twist", "twist", style.QUANTITIES["twist"].colour)
+    titles = "Mid short axis", "Long axis", "Rotation and twist"
+    labels = *(style.QUANTITIES[name].label for name in ("GCS", "GLS")), "Counter-clockwise from apex (°)"
     es = 1e3 * curves["mid"].attrs["end_systole"]
     for axes, title, label in zip(panels, titles, labels, strict=True):
         axes.axvline(es, color=style.MUTED, lw=0.9, ls=":")
@@ -61,6 +62,8 @@ def draw_strain(repository: et.Repository) -> Figure:
         )
         axes.text(es, 0.985, "ES ", color=style.MUTED, ha="right", va="top", transform=axes.get_xaxis_transform())
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, columnspacing=1, handlelength=1.2)
+    lines = [Line2D([], [], color=style.MUTED, ls=ls, label=name) for ls, name in (("-", "true"), ("--", "tracked"))]
+    style.legend_below(figure, lines)
     return figure
 
 

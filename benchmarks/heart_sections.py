@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyvista
 from matplotlib.axes import Axes
-from matplotlib.colors import TwoSlopeNorm
-from matplotlib.contour import ContourSet
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
@@ -18,7 +19,7 @@ from echotruth.fem.tetrahedra import EDGES, NODE_XI, PARTS, Mesh, shape
 from echotruth.heart import SHORT_AXIS, Heart
 from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING
 from echotruth.mechanics import fibres, kinematics
-from echotruth.report import bullseye, style
+from echotruth.report import style
 
 Floats = NDArray[np.float64]
 
@@ -32,10 +33,11 @@ AZIMUTH = np.radians(30)
 """Of the long axis, from septal to anterior: it cuts the anteroseptal and the inferolateral wall, as a parasternal or
 apical long axis does."""
 
-LEVELS = np.arange(-25, 25.1, 2.5)
-"""Borders of the colours, %; what is beyond has the colour of the end."""
+SCALE = ScalarMappable(Normalize(-style.STRAIN_LIMIT, style.STRAIN_LIMIT), style.SIGNED)
+"""Colours of strain, %."""
 
-COLOURS: dict[str, Any] = {"cmap": bullseye.COLOURMAP, "norm": TwoSlopeNorm(0, LEVELS[0], LEVELS[-1]), "extend": "both"}
+AT_ED: dict[str, Any] = {"color": style.MUTED, "linewidth": 0.8, "linestyle": (0, (2, 2))}
+"""Look of the wall at end-diastole."""
 
 
 class Plane(NamedTuple):
@@ -68,7 +70,6 @@ def instants(heart: Heart) -> dict[str, int]:
     nearest = {name: np.where(phase == name, abs(volume - half), np.inf).argmin() for name in (EJECTION, FILLING)}
     return {
         "Mid-isovolumic\ncontraction": -(-closed // 2),
-        "End of isovolumic\ncontraction": closed,
         "Mid-ejection": int(nearest[EJECTION]),
         "End-systole": heart.es,
         "Mid-filling": int(nearest[FILLING]),
@@ -134,25 +135,27 @@ def draw(hearts: dict[str, Heart]) -> Figure:
     cuts = {name: _cuts(heart) for name, heart in hearts.items()}
     limits = [_limits([row[k] for row in cuts.values()]) for k in range(2)]
     (left, right), heights = limits[0][0], [np.ptp(vertical) for _, vertical in limits]
-    figure = style.figure(7.4, 3.0 * len(hearts) + 0.9)
-    grid = figure.add_gridspec(2 * len(hearts), 6, width_ratios=[0.12] + [1] * 5, height_ratios=heights * len(hearts))
-    panels = [[figure.add_subplot(grid[row, 1 + column]) for column in range(5)] for row in range(2 * len(hearts))]
+    count = len(instants(next(iter(hearts.values()))))
+    figure = style.figure(1.6 * count + 0.3, 3.0 * len(hearts) + 1.2)
+    ratios = {"width_ratios": [0.12] + [1] * count, "height_ratios": heights * len(hearts)}
+    grid = figure.add_gridspec(2 * len(hearts), 1 + count, **ratios)
+    panels = [[figure.add_subplot(grid[row, 1 + column]) for column in range(count)] for row in range(2 * len(hearts))]
     for number, (name, heart) in enumerate(hearts.items()):
         label = figure.add_subplot(grid[2 * number : 2 * number + 2, 0])
         label.text(0.5, 0.5, name, rotation=90, ha="center", va="center", fontweight="bold", fontsize=10)
         label.axis("off")
         for k, row in enumerate(cuts[name]):
             for axes, cut in zip(panels[2 * number + k], row[1:], strict=True):
-                filled = _wall(axes, cut, row[0].borders)
+                _wall(axes, cut, row[0].borders)
                 axes.set(xlim=(left, right), ylim=limits[k][1], aspect="equal")
         for axes, frame in zip(panels[2 * number + 1], instants(heart).values(), strict=True):
             time = 1e3 * heart.arrays["mechanics"]["time"][frame]
             axes.set_xlabel(f"{time:.0f} ms", color=style.MUTED, fontsize=8)
     for axes, instant in zip(panels[0], instants(heart), strict=True):
         axes.set_title(instant, fontsize=9)
-    bar: dict[str, Any] = {"orientation": "horizontal", "shrink": 0.6, "aspect": 40, "ticks": LEVELS[2::4]}
-    label = "Circumferential strain $E_{CC}$ since end-diastole (%)"
-    figure.colorbar(filled, ax=np.ravel(panels), **bar).set_label(label)
+    bar: dict[str, Any] = {"orientation": "horizontal", "shrink": 0.7, "aspect": 40, "pad": 0.01, "extend": "both"}
+    figure.colorbar(SCALE, ax=np.ravel(panels), **bar).set_label(style.QUANTITIES["CC"].label)
+    figure.legend(handles=[Line2D([], [], **AT_ED, label="wall at end-diastole")], loc="outside lower center")
     return figure
 
 
@@ -173,12 +176,12 @@ def _limits(rows: list[list[Section]]) -> tuple[Floats, Floats]:
     return np.array([points.min(0) - margin, points.max(0) + margin]).T
 
 
-def _wall(axes: Axes, cut: Section, at_ed: list[Floats]) -> ContourSet:
-    filled = axes.tricontourf(cut.triangles, cut.strain, LEVELS, **COLOURS)
-    for border in cut.borders:
-        axes.plot(*border.T, color=style.MUTED, linewidth=0.6)
+def _wall(axes: Axes, cut: Section, at_ed: list[Floats]) -> None:
+    look: dict[str, Any] = {"cmap": SCALE.cmap, "norm": SCALE.norm, "shading": "gouraud", "rasterized": True}
+    axes.tripcolor(cut.triangles, cut.strain, **look)
     for border in at_ed:
-        axes.plot(*border.T, color=style.INK, linewidth=0.6, linestyle=(0, (4, 3)))
+        axes.plot(*border.T, **AT_ED)
+    for border in cut.borders:
+        axes.plot(*border.T, color=style.INK, linewidth=0.9)
     axes.set(xticks=[], yticks=[])
     axes.spines[:].set_visible(False)
-    return filled

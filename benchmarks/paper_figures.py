@@ -23,23 +23,23 @@ GREY, BLUE = (0.80, 0.76, 0.74), (0.16, 0.36, 0.72)
 
 @style.styled
 def draw_geometry(path: Path, hearts: Hearts) -> None:
-    """Half of every heart at end-diastole with its midsection in blue, on one scale (figure 2A)."""
+    """Half of every heart at end-diastole with its midsection in blue, on one scale, apex up (figure 2A)."""
     figure = style.figure(2.6 * len(hearts), 4.3)
     projection = {"projection": "3d", "computed_zorder": False}
     panels = figure.subplots(1, len(hearts), squeeze=False, subplot_kw=projection)[0]
     for panel, (name, heart) in zip(panels, hearts.items(), strict=True):
         _add_half(panel, heart)
-        panel.set_title(name, y=1.25)
+        panel.set_title(name, y=1.12)
     show(panels, np.concatenate([heart.mesh.positions(0) for heart in hearts.values()]))
     style.save(figure, path, dpi=110)
 
 
 def _add_half(panel: Axes3D, heart: Heart) -> None:
-    """Add the posterior half."""
+    """Add the anterior half."""
     mesh, apex = heart.mesh, heart.mesh.endo_at_ed[:, 2].min()
     cells = {pyvista.CellType.QUADRATIC_TETRA: mesh.cells.astype(np.int64)}
     grid = pyvista.UnstructuredGrid(cells, mesh.positions(0))
-    half = grid.clip("y", origin=(0, 0, 0)).extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2)
+    half = grid.clip("-y", origin=(0, 0, 0)).extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2)
     half = half.triangulate().subdivide_adaptive(max_edge_len=half.length / 40)
     upper, lower = ((0, 0, apex * (0.5 + side * SECTION_HALF_WIDTH)) for side in (-1, 1))
     above, below = half.clip("-z", origin=upper), half.clip("z", origin=lower)

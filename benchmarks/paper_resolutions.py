@@ -1,4 +1,4 @@
-"""The image sizes of one view side by side, where the wall is."""
+"""The image sizes of one view side by side, so near that their pixels are seen."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def draw(images: Sequence[np.ndarray], field_of_view: float) -> Figure:
     figure = style.figure(3.1 * len(images) + 0.4, 3.75)
     panels = figure.subplots(1, len(images), sharey=True, squeeze=False)[0]
     side = 1e3 * field_of_view
-    left, right, bottom, top = _bright(images[0], side)
+    left, right, bottom, top = _near(images[0], side)
     for panel, image in zip(panels, images, strict=True):
         extent, (rows, columns) = (-side / 2, side / 2, side, 0), image.shape
         panel.imshow(image, cmap="gray", vmin=0, vmax=255, extent=extent, interpolation="nearest")
@@ -33,13 +33,12 @@ def draw(images: Sequence[np.ndarray], field_of_view: float) -> Figure:
     return figure
 
 
-def _bright(image: np.ndarray, side: float) -> tuple[float, float, float, float]:
-    """Square around what is bright, within the image: left, right, bottom, top, mm."""
+def _near(image: np.ndarray, side: float) -> tuple[float, float, float, float]:
+    """Square about the upper wall, a quarter as wide as what is bright: left, right, bottom, top, mm."""
     rows, columns = np.nonzero(image >= 0.35 * max(int(image.max()), 1))
-    middle = np.array([rows.min() + rows.max(), columns.min() + columns.max()]) / 2
-    count = len(image) - 1
-    half = min(0.58 * max(int(np.ptp(rows)), int(np.ptp(columns)), 8), count / 2)
-    row, column = np.clip(middle, half, count - half)
-    low, high = (np.array([-half, half]) + row) / count * side
-    left, right = (np.array([-half, half]) + column) / count * side - side / 2
-    return float(left), float(right), float(high), float(low)
+    pixel = side / len(image)
+    extent, middle = 0.25 * pixel * np.ptp(columns), pixel * (columns.min() + columns.max()) / 2 - side / 2
+    # Half of the bright pixels of the middle columns lie in the upper wall.
+    central = np.abs(columns - columns.mean()) < 0.05 * np.ptp(columns)
+    upper = pixel * float(np.quantile(rows[central], 0.25))
+    return middle - extent / 2, middle + extent / 2, upper + extent / 2, upper - extent / 2

@@ -4,12 +4,11 @@
     python benchmarks/physiology.py levers
     python benchmarks/physiology.py confirm
     python benchmarks/physiology.py refine
-    python benchmarks/physiology.py page
 
 Hearts are drawn by a scrambled Sobol sequence over the levers (`search`), varied one lever at a time around the chosen
 one (`levers`), and solved on the mesh that ships (`confirm`, the paper's heart `paper`) and a finer one (`refine`). The
 search mesh has six elements around: shape, fibres and supports are the same all around, and its wall means are those of
-the full mesh to the second digit. `page` writes benchmarks/results/physiology.md and its figures from the rows.
+the full mesh to the second digit. Each writes its rows as JSON.
 """
 
 from __future__ import annotations
@@ -22,7 +21,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-RESULTS = Path("benchmarks/results")
 SEARCH_MESH, SHIPPED_MESH, FINE_MESH = (6, 8, 2), (24, 12, 3), (30, 16, 4)
 SEED = 2026
 
@@ -256,21 +254,16 @@ def shipped(source: Any) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Search, vary, confirm or write the page."""
+    """Search, vary or confirm."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=("search", "levers", "confirm", "refine", "paper", "page"))
+    parser.add_argument("what", choices=("search", "levers", "confirm", "refine", "paper"))
     parser.add_argument("--species", default="mouse", choices=tuple(TARGETS))
     parser.add_argument("--hearts", type=int, default=320)
     parser.add_argument("--steps", type=int, default=5)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--rows", type=Path, default=RESULTS / "physiology", help="folder of the rows")
+    parser.add_argument("--rows", type=Path, default=Path("out/physiology"), help="folder of the rows")
     arguments = parser.parse_args()
     arguments.rows.mkdir(parents=True, exist_ok=True)
-    if arguments.what == "page":
-        from physiology_page import write
-
-        write(arguments.rows, RESULTS)
-        return
     species, out = arguments.species, arguments.rows / f"{arguments.species}_{arguments.what}.json"
     settings = {
         "search": lambda: drawn(species, arguments.hearts),

@@ -38,10 +38,8 @@ from echotruth.report import bullseye, style
 Floats = NDArray[np.float64]
 
 ELEMENTS = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
-LOOPS = ("mouse", "human")
-"""Species whose loops are drawn."""
-UNITS = {"mouse": ("µL", 1e-9), "rat": ("µL", 1e-9), "human": ("mL", 1e-6)}
-"""Unit of volume, and m^3."""
+LOOPS, SPECIES = ("mouse", "human"), ("mouse", "rat", "human")
+"""Species whose loops are drawn, and all."""
 
 
 class State(NamedTuple):
@@ -80,19 +78,21 @@ def draw_loops(hearts: dict[str, list[et.Heart]]) -> Figure:
     """Draw the loops of all states, a panel for each species."""
     figure = style.figure(8.4, 3.9)
     for axes, (species, beaten) in zip(figure.subplots(1, len(hearts), squeeze=False)[0], hearts.items(), strict=True):
-        unit, size = UNITS[species]
+        volume, pressure = style.volume(beaten[0].arrays["mechanics"]["volume"].max()), style.QUANTITIES["pressure"]
         for state, heart in zip(STATES, beaten, strict=True):
-            _loop(axes, heart, state, size)
-        axes.set(xlabel=f"Volume ({unit})", ylabel="Pressure (mmHg)", title=species.capitalize())
+            _loop(axes, heart, state, (volume, pressure))
+        axes.set(xlabel=volume.label, ylabel=pressure.label, title=species.capitalize())
         axes.set(xlim=(0, None), ylim=(0, 1.45 * axes.get_ylim()[1]))
         axes.legend(loc="upper right", labelcolor="linecolor", fontsize=8.5, labelspacing=0.3)
     return figure
 
 
-def _loop(axes: Axes, heart: et.Heart, state: State, size: float) -> None:
+def _loop(axes: Axes, heart: et.Heart, state: State, shown: tuple[style.Quantity, style.Quantity]) -> None:
     """The closed curve through the frames, which goes beyond none of them, and the points of end-systole and ED."""
     mechanics = heart.arrays["mechanics"]
-    points = np.column_stack([mechanics["volume"] / size, mechanics["pressure"] / style.MMHG])
+    points = np.column_stack(
+        [one.factor * mechanics[name] for one, name in zip(shown, ("volume", "pressure"), strict=True)]
+    )
     frames = np.arange(-2, len(points) + 3)
     curve = PchipInterpolator(frames, points[frames % len(points)])(np.linspace(0, len(points), 481))
     fraction = 100 * float(heart.arrays["physiology"]["ejection_fraction"])
@@ -114,7 +114,7 @@ def draw_segments(hearts: list[et.Heart]) -> Figure:
     rest.axis("off")
     place = rest.inset_axes((0.05, 0.5, 0.9, 0.06))
     bar = figure.colorbar(ScalarMappable(scale, bullseye.COLOURMAP), cax=place, orientation="horizontal")
-    bar.set_label("Circumferential strain $E_{CC}$\nsince end-diastole,\nat end-systole (%)")
+    bar.set_label(style.QUANTITIES["CC"].label + "\nsince end-diastole,\nat end-systole")
     return figure
 
 
@@ -184,7 +184,7 @@ def save(figure: Figure, path: Path) -> None:
 def main() -> None:
     """Solve the hearts and draw them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("species", nargs="?", default="mouse", choices=tuple(UNITS), help="of all but the loops")
+    parser.add_argument("species", nargs="?", default="mouse", choices=SPECIES, help="of all but the loops")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/gallery"))
     arguments = parser.parse_args()
     hearts = {species: [solved(species, state) for state in STATES] for species in LOOPS}

@@ -145,10 +145,9 @@ def draw(results: Results) -> Figure:
     figure = style.figure(6.4, 2.6)
     axes = figure.add_subplot()
     labels = "force inside", "force on the surface", "solved motion"
-    colours = style.RADIAL, style.CIRCUMFERENTIAL, style.LONGITUDINAL
-    for k, (label, colour) in enumerate(zip(labels, colours, strict=True)):
+    for k, label in enumerate(labels):
         x = np.arange(len(results.errors)) + 0.25 * (k - 1)
-        axes.bar(x, [errors[k] for errors in results.errors.values()], 0.22, color=colour, label=label)
+        axes.bar(x, [errors[k] for errors in results.errors.values()], 0.22, color=style.SERIES[k], label=label)
     axes.set_xticks(np.arange(len(results.errors)), list(results.errors))
     axes.set(yscale="log", ylim=(1e-17, 1e-4), ylabel="relative error")
     axes.legend(ncols=3, loc="upper center")

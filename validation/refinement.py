@@ -114,11 +114,12 @@ def draw(results: Results) -> Figure:
     """Strains and tension against the number of cells."""
     figure = style.figure(7.2, 3.0)
     left, right = figure.subplots(1, 2)
-    colours = {"E_RR": style.RADIAL, "E_CC": style.CIRCUMFERENTIAL, "E_LL": style.LONGITUDINAL}
     for name, component in STRAINS.items():
-        left.semilogx(results.cells, results.mean[:, component], "o-", color=colours[name], markersize=4, label=name)
-    left.set(xlabel="cells", ylabel="wall mean at end-systole")
+        shown = style.QUANTITIES[name.removeprefix("E_")]
+        look = {"color": shown.colour, "markersize": 4, "label": shown.tex}
+        left.semilogx(results.cells, shown.factor * results.mean[:, component], "o-", **look)
+    left.set(xlabel="Cells", ylabel="Wall mean at end-systole (%)")
     left.legend(loc="center right")
     right.semilogx(results.cells, np.array(results.tension) / 1e3, "o-", color=style.SOLVED, markersize=4)
-    right.set(xlabel="cells", ylabel="T_Ca at end-systole (kPa)")
+    right.set(xlabel="Cells", ylabel="$T_{Ca}$ at end-systole (kPa)")
     return figure

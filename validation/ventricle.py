@@ -238,8 +238,8 @@ def draw(results: Results) -> Figure:
     pairs = ((results.inflated, "Problem 2"), (results.contracting, "Problem 3"))
     for axes_, (solved, title) in zip(panels, pairs, strict=False):
         for points, line in zip(solved.surfaces, solved.outlines, strict=True):
-            axes_.plot(*points.T * 1e3, ".", color=style.CIRCUMFERENTIAL, markersize=3)
-            axes_.plot(*line.T * 1e3, color=style.RADIAL, linewidth=0.9)
+            axes_.plot(*points.T * 1e3, ".", color=style.SERIES[0], markersize=3)
+            axes_.plot(*line.T * 1e3, color=style.SERIES[1], linewidth=0.9)
         axes_.set(title=title, xlabel="distance from the axis (mm)", aspect="equal")
     panels[0].set_ylabel("height above the equator (mm)")
     for (solved, title), marker in zip(pairs, "os", strict=True):

@@ -15,9 +15,6 @@ from echotruth.report import style
 from validation import energies, heart
 from validation.report import Report, Row
 
-PERICARDIUM = "#8a5aa8"
-"""Colour of its work."""
-
 
 @dataclass(frozen=True)
 class Results:
@@ -216,15 +213,14 @@ def draw(results: Results) -> Figure:
     """Works of each frame."""
     figure = style.figure(7.2, 3.2)
     axes = figure.add_subplot()
-    colours = (style.LONGITUDINAL, style.RADIAL, style.TARGET, style.CIRCUMFERENTIAL, PERICARDIUM)
     names = ("passive", "active", "volume", "viscous", "pericardium")
     width = np.diff(results.time[:2])[0] * 1e3 * 0.8
     low, high = np.zeros((2, len(results.time)))
-    for part, name, colour in zip(results.wall.T * 1e6, names, colours, strict=True):
+    for part, name, colour in zip(results.wall.T * 1e6, names, style.SERIES, strict=False):
         bottom = np.where(part > 0, high, low)
         axes.bar(results.time * 1e3, part, width, bottom, color=colour, label=name)
         low, high = low + np.minimum(part, 0), high + np.maximum(part, 0)
     axes.plot(results.time * 1e3, results.blood * 1e6, color=style.SOLVED, label="blood")
-    axes.set(xlabel="time (ms)", ylabel="work (uJ)")
+    axes.set(xlabel="Time since end-diastole (ms)", ylabel="Work (µJ)")
     axes.legend(loc="lower right")
     return figure

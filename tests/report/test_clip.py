@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from echotruth.report import clip
+from echotruth.report import clip, style
 
 
 @pytest.fixture
@@ -14,6 +14,18 @@ def made():
     return clip.ClipWithMotion(image, 1e-4, np.arange(4) * 3e-3, position, np.broadcast_to(motion, (4, 4, 2)).copy())
 
 
+@pytest.fixture
+def strain():
+    """Shortening of a square of tissue, none outside."""
+    found = np.full((4, 96, 96), np.nan)
+    found[:, 40:60, 40:60] = -0.2
+    return found
+
+
+def drawn(made, strain, height):
+    return clip.render(made, strain, style.QUANTITIES["CC"], height)
+
+
 def test_thin_keeps_its_distance():
     position = np.stack(np.meshgrid(np.arange(10.0), np.arange(10.0)), -1).reshape(-1, 2)
     chosen = position[clip.thin(position, 3)]
@@ -21,35 +33,44 @@ def test_thin_keeps_its_distance():
     assert apart.min() >= 3 and len(chosen) >= 9
 
 
-def test_frames_show_the_motion(made):
-    frames = clip.render(made, 240)
-    assert frames.shape == (4, 240, 240, 3) and frames.dtype == np.uint8
-    # The image is grey, so that what has a hue is drawn over it.
-    drawn = [(frame[..., 0] - frame[..., 2] > 60).sum() for frame in frames.astype(int)]
-    assert 0 < drawn[0] < drawn[1] < drawn[3]
+def test_frames_show_the_image_and_beside_it_the_motion_and_shortening_in_blue(made, strain):
+    frames = drawn(made, strain, 240)
+    assert frames.shape == (4, 240, 552, 3) and frames.dtype == np.uint8
+    plain, truth = frames[:, :, :240].astype(int), frames[:, :, 242:482].astype(int)
+    assert (np.ptp(plain, axis=-1) == 0).all(), "the image is grey"
+    amber = [(frame[..., 0] - frame[..., 2] > 60).sum() for frame in truth]
+    assert 0 < amber[0] < amber[1] < amber[3]
+    assert all((frame[..., 2] - frame[..., 0] > 40).sum() > 1000 for frame in truth)
 
 
-def test_lost_points_do_not_stop_the_clip(made):
+def test_dark_wall_is_brightened_and_a_bright_one_left_as_it_is():
+    dark, bright, wall = np.full((2, 4, 4), 30), np.full((2, 4, 4), 200), np.ones((2, 4, 4), bool)
+    assert clip._brightened(dark, wall) == pytest.approx(clip.WALL_GREY)
+    assert (clip._brightened(bright, wall) == bright).all()
+
+
+def test_lost_points_do_not_stop_the_clip(made, strain):
     made.displacement[2:, 1] = np.nan
-    assert clip.render(made, 120).std() > 5
+    assert drawn(made, strain, 120).std() > 5
 
 
-def test_gif_and_video(made, tmp_path):
-    frames = clip.render(made, 120)
+def test_animations_and_video(made, strain, tmp_path):
+    frames = drawn(made, strain, 120)
     picture = Image.open(clip.gif(tmp_path / "clip.gif", frames))
-    assert picture.n_frames == 4 and picture.size == (120, 120) and picture.info["duration"] == 50
+    assert picture.n_frames == 4 and picture.size == (276, 120) and picture.info["duration"] == 50
+    assert Image.open(clip.webp(tmp_path / "clip.webp", frames)).n_frames == 4
     video = clip.mp4(tmp_path / "clip.mp4", frames).read_bytes()
     assert video[4:8] == b"ftyp" and len(video) > 1000
 
 
-def test_gif_shows_what_its_frames_show(made, tmp_path):
-    frames = clip.render(made, 240)
+def test_gif_shows_what_its_frames_show(made, strain, tmp_path):
+    frames = drawn(made, strain, 240)
     picture = Image.open(clip.gif(tmp_path / "clip.gif", frames))
     picture.seek(2)
-    shown, drawn = np.asarray(picture.convert("RGB")).astype(int), frames[2].astype(int)
-    assert np.abs(shown - drawn).mean() < 5
-    coloured = drawn[..., 0] - drawn[..., 2] > 60
-    assert np.abs(shown - drawn)[coloured].mean() < 12
+    shown, wanted = np.asarray(picture.convert("RGB")).astype(int), frames[2].astype(int)
+    assert np.abs(shown - wanted).mean() < 5
+    coloured = wanted[..., 0] - wanted[..., 2] > 60
+    assert np.abs(shown - wanted)[coloured].mean() < 12
 
 
 def test_gif_of_noise_stays_small(tmp_path):

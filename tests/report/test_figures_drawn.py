@@ -7,7 +7,10 @@ import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
+from echotruth.config import Geometry
 from echotruth.evaluation.leaderboard import best, standings
+from echotruth.heart import Heart
+from echotruth.mechanics.geometry import left_ventricle
 from echotruth.report import (
     bullseye,
     curves,
@@ -86,15 +89,41 @@ def test_views(tmp_path):
     image = np.random.default_rng(0).integers(0, 256, (64, 64)).astype(np.uint8)
     layer = np.zeros((64, 64), int)
     layer[20:40, 20:40] = 1
+    there = views.Where(np.array([[[-1.0, 0], [1, 0]], [[1, 0], [0, 2]]]), np.array([0.0, 1]), np.array([0.0, 0.5]))
     shown, outside = (
         xr.Dataset({"image": (("axial", "lateral"), image), "layer": (("axial", "lateral"), labels)})
         for labels in (layer, 0 * layer)
     )
     one = {"mid": [shown] * 2, "long_axis": [outside] * 2}
-    border = coloured(seen(style.save(views.draw(one, 12e-3), tmp_path / "one.png")), views.BORDER)
-    layer[30:40, 20:40] = 2
-    two = coloured(seen(style.save(views.draw(one, 12e-3), tmp_path / "two.png")), views.BORDER)
-    assert two > border > 100, "there is a line between two layers"
+    places = dict.fromkeys(one, there)
+    with_wall = coloured(seen(style.save(views.draw(one, places, 12e-3), tmp_path / "one.png")), style.BORDER)
+    without = {view: [outside] * 2 for view in one}
+    planes = coloured(seen(style.save(views.draw(without, places, 12e-3), tmp_path / "two.png")), style.BORDER)
+    assert with_wall > planes + 100 and planes > 100, "both planes and the wall have their lines"
+
+
+@pytest.mark.parametrize(
+    ("plane", "origin", "normal", "normal_on_page", "point"),
+    [
+        ("short_axis", (0, 6e-3, -2e-3), (0, 0, 1), (0, -1), (0, -1)),
+        ("long_axis", (1e-3, 0, 0), (1, 0, 0), (-1, 0), (-1, 0)),
+    ],
+)
+def test_place_of_a_view_is_a_line_across_a_section_with_the_apex_or_the_anterior_wall_up(
+    plane, origin, normal, normal_on_page, point
+):
+    """A heart from z = -6 to 0 mm, so that its middle is at z = -3 mm."""
+    mesh = left_ventricle(Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1))
+    nodes = mesh.nodes * 6e-3 / np.ptp(mesh.nodes[:, 2])
+    nodes = nodes - [0, 0, nodes[:, 2].max()] - [0, 0, nodes[:, 2].mean() - nodes[:, 2].max() + 3e-3]
+    solved = Heart(nodes, mesh.cells, np.zeros((1, *nodes.shape)), mesh.nodes[:, 0], mesh.endo, 1, 0)
+    found = views.where(solved, plane, origin, normal)
+    np.testing.assert_allclose(found.normal, normal_on_page, atol=1e-12)
+    np.testing.assert_allclose(found.point, point, atol=1e-6)
+    if plane == "short_axis":
+        top = found.wall[np.argmax(found.wall[:, 0, 1]), 0]
+        widths = [np.ptp(found.wall[found.wall[..., 1] * side > 1, 0]) for side in (1, -1)]
+        assert top[0] == pytest.approx(0, abs=0.3) and widths[0] < widths[1], "the narrow end, the apex, is up"
 
 
 def test_views_show_the_part_that_holds_the_wall(tmp_path):

@@ -50,11 +50,11 @@ def test_motion_can_be_left_out(player):
     assert not amber(player).any()
 
 
-def test_strain_and_tracked_motion_are_drawn_where_they_are_asked_for(player):
+def test_strain_is_drawn_at_first_and_tracked_motion_where_it_is_asked_for(player):
     player.locator("#frame").fill("2")
     shown = [player.evaluate("document.getElementById('screen').toDataURL()")]
-    for box in ("#show-strain", "#show-tracked"):
-        player.check(box)
+    for box, act in (("#show-strain", player.uncheck), ("#show-tracked", player.check)):
+        act(box)
         shown.append(player.evaluate("document.getElementById('screen').toDataURL()"))
     assert len(set(shown)) == 3
 

@@ -89,7 +89,10 @@ def test_what_is_shown_already_is_not_sent_again(page):
 
 def test_truth_beside_a_tracker_has_its_strain_and_no_error(page):
     choose(page, other=TRUTH, colour="tracked_strain", component="RR")
-    assert [panel.bar.title for panel in page.panels] == ["Tracked radial strain (%)", "True radial strain (%)"]
+    assert [panel.bar.title for panel in page.panels] == [
+        "Tracked radial strain E_RR (%)",
+        "True radial strain E_RR (%)",
+    ]
     choose(page, colour="strain_error")
     assert page.panels[0].bar.visible and not page.panels[1].bar.visible
 

@@ -3,7 +3,7 @@
 import {curve, distance, fitted, nearest, pieces} from "./curve.js";
 
 const PARTS = {
-  endocardium: {label: "Endocardium", colour: "#ffb000"},
+  endocardium: {label: "Endocardium", colour: "#ffd34d"},
   epicardium: {label: "Epicardium", colour: "#56b4e9"},
   anterior_insertion: {label: "Anterior insertion", colour: "#ff6fb5", letter: "A"},
   inferior_insertion: {label: "Inferior insertion", colour: "#7ee081", letter: "I"},

@@ -6,10 +6,11 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 
 from echotruth.report import style
 
-COLOURS = ("#f5b942", "#5ec8d8", "#e0607e")
+COLOURS = tuple(map(to_hex, style.layer_colours(3)))
 """Of the endocardial, middle and epicardial line."""
 DOUBT = "#b3261e"
 """Of what is said of a doubtful strain."""

@@ -15,8 +15,7 @@ from matplotlib.patches import Patch, Wedge
 from echotruth.aha import BULLSEYE
 from echotruth.report import style
 
-COLOURMAP = colormaps["RdBu_r"]
-"""Blue below zero, red above."""
+COLOURMAP = colormaps[style.SIGNED]
 
 UNSEEN: dict[str, Any] = {"facecolor": "none", "edgecolor": style.TARGET, "hatch": "////"}
 """Look of a segment that no view shows, or in which nothing is tracked."""

@@ -6,19 +6,17 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib import colormaps
 from numpy.typing import NDArray
 from PIL import Image
 
 from echotruth.report import style
 from echotruth.report.clip import ClipWithMotion, crop, round_length, thin
-from echotruth.report.comparison import LINE, Comparison
+from echotruth.report.comparison import Comparison, strain_of_line
 from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS
 from echotruth.tracking.point_grid import grid_points
-
-STRAIN_LIMIT = 30
-"""Largest strain on the scale of colours, to either side, %."""
 
 ARROW_SPACING = 0.0375
 """Smallest distance of points whose motion is drawn, over the side of the image: 0.45 mm for a mouse."""
@@ -38,6 +36,9 @@ MAX_SIDE = 360
 MAX_PIXELS = 24_000_000
 """Largest number of pixels of all frames of all clips of a page."""
 
+SHADES = 61
+"""Steps of the scale of strain, an odd number, so that one of them is zero."""
+
 COLUMNS = 8
 """Frames in a row of the picture."""
 
@@ -54,8 +55,7 @@ def clips(comparison: Comparison) -> dict[str, Any]:
     -------
     dict
         View -> numbers, texts and lists, which JSON can hold; arrays are base64 of little-endian integers: 16 bit for
-        positions, in steps of 1 / `STEPS_PER_PIXEL` of a pixel of the picture (-32768 where there is none), 8 bit for
-        strains, in percent.
+        positions, in steps of 1 / `STEPS_PER_PIXEL` of a pixel of the picture (-32768 where there is none).
     """
     views = list(comparison.views)[:MAX_VIEWS]
     return {view: _clip(comparison, view, len(views)) for view in views}
@@ -89,11 +89,16 @@ def with_motion(repository: Repository, case: str, view: str, size: int) -> tupl
 def _clip(comparison: Comparison, view: str, count: int) -> dict[str, Any]:
     """One clip of several for the player, with the strain over the cycle of the best tracker."""
     repository, size, best = comparison.repository, comparison.size, comparison.trackers[0]
-    place = repository, comparison.case.id, view
-    clip, inside = with_motion(*place, size)
-    found = estimates.tracked(*place, best, size, "displacement")["displacement"][:, inside].astype(float)
+    case = comparison.case.id
+    clip, inside = with_motion(repository, case, view, size)
+    found = estimates.tracked(repository, case, view, best, size, "displacement")["displacement"][:, inside].astype(
+        float
+    )
     chosen, curves = thin(clip.position, ARROW_SPACING * size), comparison.curves[view][best]
-    shown, corner, factor = _sheet(clip, count)
+    name = style.ALONG[curves.attrs["plane"]]
+    quantity, component = style.QUANTITIES[name], LABELS["strain_component"].index(name)
+    strain = repository.read(f"truth/{size}/strain", case, view, ..., component)
+    shown, corner, factor = _sheets(clip, strain, count)
     pixel = clip.spacing / factor  # m, of the picture
     bar = round_length(max(shown["width"], shown["height"]) * pixel)
 
@@ -105,10 +110,8 @@ def _clip(comparison: Comparison, view: str, count: int) -> dict[str, Any]:
         "es": curves.attrs["es_frame"],
         "points": clip.path.shape[1],
         "steps": STEPS_PER_PIXEL,
-        "radius": round(0.62 * factor * _spacing(clip.path[0]), 2),
         "path": placed(clip.path),
-        "strain": _integers(100 * _strain(*place)[:, inside], np.int8),
-        "strain_limit": STRAIN_LIMIT,
+        "strain_name": f"true {quantity.words.lower()} {quantity.symbol} ({quantity.unit})",
         "chosen": chosen.tolist(),
         "tracked": placed((clip.position + found / clip.spacing)[:, chosen]),
         "bar_px": round(bar / pixel, 2),
@@ -117,19 +120,23 @@ def _clip(comparison: Comparison, view: str, count: int) -> dict[str, Any]:
     }
 
 
-def _sheet(clip: ClipWithMotion, count: int) -> tuple[dict[str, Any], NDArray[np.float64], float]:
-    """All frames about the wall in one picture, row by row.
+def _sheets(
+    clip: ClipWithMotion, strain: NDArray[np.float32], count: int
+) -> tuple[dict[str, Any], NDArray[np.float64], float]:
+    """All frames about the wall in one picture, row by row, and the colours of their strain in another.
 
     Parameters
     ----------
     clip : ClipWithMotion
+    strain : ndarray of shape (frame, axial, lateral)
+        NaN outside the wall.
     count : int
         Number of clips on the page, which share its size.
 
     Returns
     -------
     shown : dict
-        The picture, size and number of its frames.
+        The pictures, size and number of their frames.
     corner : ndarray of shape (2,)
         Upper left corner of a frame of it: lateral, axial, px of the clip.
     factor : float
@@ -138,22 +145,41 @@ def _sheet(clip: ClipWithMotion, count: int) -> tuple[dict[str, Any], NDArray[np
     left, right, lower, upper = crop(clip)
     column, row, extent = int(np.floor(left)), int(np.floor(upper)), int(np.ceil(max(right - left, lower - upper)))
     tissue = clip.image[:, row : row + extent + 1, column : column + extent + 1]
+    colour = _entries(strain[:, row : row + extent + 1, column : column + extent + 1])
     largest = max(tissue.shape[1:])
     factor = min(MAX_SIDE, int((MAX_PIXELS / (count * len(tissue))) ** 0.5), largest) / largest
-    width, height = (round(side * factor) for side in tissue.shape[:0:-1])
-    sheet = Image.new("L", (width * min(COLUMNS, len(tissue)), height * -(-len(tissue) // COLUMNS)))
-    for number, frame in enumerate(tissue):
-        picture = Image.fromarray(frame).resize((width, height), Image.Resampling.LANCZOS)
+    size = tuple(round(side * factor) for side in tissue.shape[:0:-1])
+    sheets = {
+        "sheet": address(_pasted(tissue, size, Image.Resampling.LANCZOS), "jpeg", quality=QUALITY, optimize=True),
+        "colours": address(_coloured(_pasted(colour, size, Image.Resampling.NEAREST)), "png", optimize=True),
+    }
+    numbers = {"width": size[0], "height": size[1], "columns": COLUMNS, "frames": len(tissue)}
+    return sheets | numbers, np.array([column, row]) - 0.5, factor
+
+
+def _pasted(frames: NDArray[np.uint8], size: tuple[int, ...], filter_: Image.Resampling) -> Image.Image:
+    """Frames of a size, row by row in one picture."""
+    width, height = size
+    sheet = Image.new("L", (width * min(COLUMNS, len(frames)), height * -(-len(frames) // COLUMNS)))
+    for number, frame in enumerate(frames):
+        picture = Image.fromarray(frame).resize((width, height), filter_)
         sheet.paste(picture, (number % COLUMNS * width, number // COLUMNS * height))
-    size = {"width": width, "height": height, "columns": COLUMNS, "frames": len(tissue)}
-    return {"sheet": jpeg_address(sheet)} | size, np.array([column, row]) - 0.5, factor
+    return sheet
 
 
-def _strain(repository: Repository, case: str, view: str) -> NDArray[np.float64]:
-    """True engineering strain along the wall, in the plane, (frame, rows, columns): sqrt(1 + 2 E) - 1."""
-    strain = estimates.true(repository, case, view, "true_strain")["true_strain"]
-    along = strain[LABELS["reference"].index("plane"), ..., LABELS["wall_component"].index("TT")]
-    return np.sqrt(np.maximum(1 + 2 * along.astype(float), 0)) - 1
+def _entries(strain: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Steps of the scale of strain, from 1; 0 where there is none."""
+    place = (style.FACTORS["%"] * strain / style.STRAIN_LIMIT + 1) / 2 * (SHADES - 1)
+    return np.where(np.isfinite(place), 1 + np.rint(np.clip(np.nan_to_num(place), 0, SHADES - 1)), 0).astype(np.uint8)
+
+
+def _coloured(entries: Image.Image) -> Image.Image:
+    """A picture of :func:`_entries` in the colours of strain, transparent where there is none."""
+    table = np.vstack([np.zeros(3), colormaps[style.SIGNED](np.linspace(0, 1, SHADES))[:, :3]])
+    picture = entries.copy()
+    picture.putpalette(np.rint(255 * table).astype(np.uint8).tobytes())
+    picture.info["transparency"] = 0
+    return picture
 
 
 def _course(curves: xr.Dataset) -> dict[str, Any]:
@@ -163,14 +189,14 @@ def _course(curves: xr.Dataset) -> dict[str, Any]:
         for name in ("true", "tracked")
         for values in [curves[f"{name}_line_strain"].sel(contour="middle").values]
     }
-    return {"title": f"{style.title(curves.attrs['view'])}: {LINE[curves.attrs['plane']]}"} | lists
+    return {"title": f"{style.title(curves.attrs['view'])}: {strain_of_line(curves.attrs['plane'])}"} | lists
 
 
-def jpeg_address(picture: Image.Image) -> str:
-    """A grey picture as JPEG, as an address that holds its data."""
+def address(picture: Image.Image, kind: str, **settings: Any) -> str:
+    """A picture as JPEG or PNG, as an address that holds its data."""
     file = BytesIO()
-    picture.save(file, "JPEG", quality=QUALITY, optimize=True)
-    return "data:image/jpeg;base64," + b64encode(file.getvalue()).decode()
+    picture.save(file, kind, **settings)
+    return f"data:image/{kind};base64," + b64encode(file.getvalue()).decode()
 
 
 def _integers(values: NDArray[np.float64], kind: type[np.signedinteger[Any]]) -> str:
@@ -179,9 +205,3 @@ def _integers(values: NDArray[np.float64], kind: type[np.signedinteger[Any]]) ->
     rounded = np.clip(np.rint(np.nan_to_num(values)), limits.min + 1, limits.max)
     integers = np.where(np.isfinite(values), rounded, limits.min).astype(np.dtype(kind).newbyteorder("<"))
     return b64encode(integers.tobytes()).decode()
-
-
-def _spacing(position: NDArray[np.float64]) -> float:
-    """Distance of neighbours in a grid of points (point, 2)."""
-    steps = np.diff(np.unique(np.round(position[np.isfinite(position).all(-1)][:, 0], 3)))
-    return float(steps.min(initial=np.inf)) if steps.size else 1.0

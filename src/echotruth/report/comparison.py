@@ -20,12 +20,6 @@ from echotruth.report.bullseye import Segments
 from echotruth.report.curves import Panel
 from echotruth.repository.reader import Repository
 
-FACTORS = {"%": 100.0, "deg": np.degrees(1)}
-"""Unit of curves -> factor from SI."""
-
-LINE = {"short_axis": "Circumferential strain, GCS", "long_axis": "Longitudinal strain, GLS"}
-"""Plane -> the strain of the mid-wall contour in it."""
-
 COMPONENTS = (
     ("short_axis", "TT", "Circumferential strain, from the short-axis views"),
     ("short_axis", "RR", "Radial strain, from the short-axis views"),
@@ -82,11 +76,11 @@ class Comparison:
         turns: list[Panel | None] = []
         whole = {"measure": "engineering", "region": 0, "wall_component": "RR"}
         for view, settings in self.views.items():
-            found, title = self.curves[view], f"{style.title(view)}\n{LINE[settings.plane]}"
+            found, title = self.curves[view], f"{style.title(view)}\n{strain_of_line(settings.plane)}"
             strains[0].append(_panel(title, "%", found, "line_strain", {"contour": "middle"}))
             strains[1].append(_panel("Radial strain in the plane", "%", found, "region_strain", whole))
             is_short = settings.plane == "short_axis"
-            turns.append(_panel("Rotation", "deg", found, "rotation", {}) if is_short else None)
+            turns.append(_panel("Rotation", "°", found, "rotation", {}) if is_short else None)
         if twist := self.twist:
             place = turns.index(None) if None in turns else len(turns)
             for row in (*strains, turns) if place == len(turns) else ():
@@ -102,7 +96,7 @@ class Comparison:
             return None
         base, apex = (self.curves[view] for view in views)
         found = {name: twist_of(base[name], apex[name]) for name in self.trackers}
-        return _panel("Twist, apex less base", "deg", found, "twist", {})
+        return _panel("Twist, apex less base", "°", found, "twist", {})
 
     def segments(self, view: str, tracker: str) -> list[list[Panel | None]]:
         """Panels of the strain along the wall of the segments of a view, three in a row.
@@ -133,13 +127,19 @@ class Comparison:
         for view in views:
             data = self.curves[view][tracker]
             strain = data[f"{name}_segment_strain"].sel(measure="engineering", wall_component=component)
-            columns.append(FACTORS["%"] * strain.isel(frame=int(data.attrs["es_frame"])).values)
+            columns.append(style.FACTORS["%"] * strain.isel(frame=int(data.attrs["es_frame"])).values)
         return pd.DataFrame(np.array(columns, float)).mean().to_numpy()  # of those that are known
+
+
+def strain_of_line(plane: str) -> str:
+    """Name of the strain of the mid-wall contour in a plane."""
+    quantity = style.QUANTITIES[style.GLOBAL[plane]]
+    return f"{quantity.words} {quantity.symbol}"
 
 
 def _panel(title: str, unit: str, found: Mapping[str, xr.Dataset], name: str, selection: Mapping[str, Any]) -> Panel:
     """Panel of a curve, true and by the trackers of which data sets are given."""
-    first, factor = next(iter(found.values())), FACTORS[unit]
+    first, factor = next(iter(found.values())), style.FACTORS[unit]
     time = 1e3 * first["time"].values
     true = factor * first[f"true_{name}"].sel(selection).values
     tracked = {tracker: factor * data[f"tracked_{name}"].sel(selection).values for tracker, data in found.items()}

@@ -14,7 +14,6 @@ from PIL import Image
 from echotruth.cases.labels import heart_of
 from echotruth.evaluation.leaderboard import best, standings
 from echotruth.heart import Heart
-from echotruth.mechanics.bounds import CC
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
 from echotruth.report import (
     bullseye,
@@ -44,6 +43,9 @@ NAMES = (
     *("heart", "clip", "views"),
 )
 """Figures, in the order in which they are drawn."""
+
+GIF_HEIGHT, VIDEO_HEIGHT = 300, 720
+"""Of the clip, px."""
 
 NONE_INFERRED = "Nothing was inferred of any heart. The reasons are in the report."
 """In place of the figure of what was inferred."""
@@ -106,15 +108,14 @@ class Figures:
         return self.repository.read("mechanics/time", self.case)
 
     def heart(self) -> Figure:
-        """The heart in space, unloaded, at end-diastole and end-systole."""
-        solved, fibre, frames = self.shown, self.shown.arrays["fibres"]["fibre"], (0, self.shown.es)
+        """The heart in space: its fibres at end-diastole and its strain at end-systole."""
+        solved, frames = self.shown, (0, self.shown.es)
         kinematics = centroid_kinematics(solved, frames)
-        states = [heart.State("Unloaded", solved.nodes, fibre, np.zeros(len(fibre)))]
-        for number, name in enumerate(("End-diastole", "End-systole")):
-            carried = np.einsum("cij,cj->ci", kinematics["deformation_gradient"][number], fibre)  # F f
-            circumferential = kinematics["strain_unloaded"][number, :, CC]
-            states.append(heart.State(name, solved.positions(frames[number]), carried, circumferential))
-        return heart.draw(solved.cells, fibre_angles(solved)["helix_angle"], states)
+        carried = np.einsum(
+            "cij,cj->ci", kinematics["deformation_gradient"][0], solved.arrays["fibres"]["fibre"]
+        )  # F f
+        nodes = np.stack([solved.positions(frame) for frame in frames])
+        return heart.draw(solved.cells, nodes, carried, fibre_angles(solved)["helix_angle"], kinematics["strain"][1])
 
     def loop(self) -> Figure:
         """The target and the solved loop, and the active tension."""
@@ -141,20 +142,29 @@ class Figures:
         return population.draw(measures(self.repository, self.repository.shown), diagnoses)
 
     def clip(self) -> None:
-        """The clip with its true motion, as a GIF and as a video."""
-        moving, _ = with_motion(self.repository, self.case, self.view, self.sizes[0])
-        chosen = clip.thin(moving.position, ARROW_SPACING * self.sizes[0])
+        """The clip beside its truth, as a GIF and as a video."""
+        clip.gif(self.folder / "clip.gif", self.frames(GIF_HEIGHT))
+        clip.mp4(self.folder / "clip.mp4", self.frames(VIDEO_HEIGHT))
+
+    def frames(self, height: int) -> NDArray[np.uint8]:
+        """Frames of the clip beside its truth, of a height, px."""
+        size, plane = self.sizes[0], self.config.views[self.view].plane
+        moving, _ = with_motion(self.repository, self.case, self.view, size)
+        chosen = clip.thin(moving.position, ARROW_SPACING * size)
         overlaid = replace(moving, position=moving.position[chosen], displacement=moving.displacement[:, chosen])
-        clip.gif(self.folder / "clip.gif", clip.render(overlaid, 400))
-        clip.mp4(self.folder / "clip.mp4", clip.render(overlaid, 720))
+        component = LABELS["strain_component"].index(style.ALONG[plane])
+        strain = self.repository.read(f"truth/{size}/strain", self.case, self.view, ..., component)
+        return clip.render(overlaid, strain, style.QUANTITIES[style.ALONG[plane]], height)
 
     def views(self) -> Figure:
-        """Every view at end-diastole and end-systole."""
-        pictures = {}
-        for view in self.config.views:
+        """Every view: where it is in the heart, and its images at end-diastole and end-systole."""
+        pictures, places = {}, {}
+        for view, settings in self.config.views.items():
             found = self.repository.clip(self.case, view, self.sizes[0], ("image", "layer"))
             pictures[view] = [found.isel(frame=frame) for frame in (0, self.shown.es)]
-        return views.draw(pictures, self.config.bmode.si().field_of_view)
+            plane = found.attrs["plane_origin"], found.attrs["plane_axes"][6:]
+            places[view] = views.where(self.shown, settings.plane, *plane)
+        return views.draw(pictures, places, self.config.bmode.si().field_of_view)
 
     @cached_property
     def standings(self) -> pd.DataFrame:

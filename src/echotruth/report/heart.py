@@ -1,7 +1,7 @@
-"""The heart in three dimensions: fibres and circumferential strain, unloaded, at end-diastole and at end-systole."""
+"""The heart in three dimensions, apex up: its fibres at end-diastole, and strain along its wall at end-systole."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pyvista
@@ -15,71 +15,65 @@ from echotruth.fem.tetrahedra import shape
 from echotruth.mechanics.fibres import CENTROID
 from echotruth.report import style
 
-ELEVATION, AZIMUTH = 23.0, 115.0
-"""Direction to the eye in the heart frame, degrees: anterior and somewhat above, the septum on the left."""
+ELEVATION, AZIMUTH, ROLL = -20.0, -115.0, 180.0
+"""Direction to the eye in the heart frame, degrees: inferior, and somewhat beyond the apex. The picture is upside down:
+the apex is up and the septum on the left, as in an apical echo."""
 
-AMBIENT = 0.42
+STRAINS = {"CC": 1, "LL": 2}
+"""Component that is shown -> its number in the arrays."""
+
+AMBIENT = 0.5
 """Fraction of the light that is ambient; the rest comes from the eye."""
 
 GROUND = 0.62
 """Brightness of the wall between its fibres, over theirs."""
 
+SCALES = (90, "turbo"), (style.STRAIN_LIMIT, style.SIGNED)
+"""End to either side and colour map of the helix angle, degrees, and of strain, %."""
+
 ROD_LENGTH = 0.075
 """Length of the rods that show fibres, over that of the heart."""
 
 
-@dataclass(frozen=True)
-class State:
-    """The heart in one state.
-
-    Attributes
-    ----------
-    nodes : ndarray of shape (node, 3)
-        Positions of the nodes, m.
-    fibre : ndarray of shape (cell, 3)
-        Directions of the fibres at the cell centroids, of any length.
-    strain : ndarray of shape (cell,)
-        Circumferential strain from unloaded.
-    """
-
-    name: str
-    nodes: np.ndarray
-    fibre: np.ndarray
-    strain: np.ndarray
-
-
 @style.styled
-def draw(cells: np.ndarray, helix: np.ndarray, states: Sequence[State]) -> Figure:
-    """Draw the states side by side, fibres above and strain below, a quarter of the wall cut away.
+def draw(cells: np.ndarray, nodes: np.ndarray, fibre: np.ndarray, helix: np.ndarray, strain: np.ndarray) -> Figure:
+    """Draw the fibres and each strain side by side, a quarter of the wall cut away.
 
     Parameters
     ----------
     cells : ndarray of shape (cell, 10)
         Nodes of the quadratic tetrahedra, in VTK's order.
+    nodes : ndarray of shape (2, node, 3)
+        Their positions at end-diastole and at end-systole, m.
+    fibre : ndarray of shape (cell, 3)
+        Directions of the fibres at the cell centroids at end-diastole, of any length.
     helix : ndarray of shape (cell,)
         Helix angle of the fibres, unloaded, rad.
-    states : sequence of State
-        From left to right.
+    strain : ndarray of shape (cell, 6)
+        At end-systole since end-diastole.
     """
     # In a sweep, hearts with fewer elements are padded with cells of one repeated node and NaN nodes.
     real = cells.min(1) < cells.max(1)
-    cells, helix = cells[real], helix[real]
-    states = [State(s.name, np.nan_to_num(s.nodes), s.fibre[real], s.strain[real]) for s in states]
-    limit = max(100 * float(np.nanmax(np.abs([state.strain for state in states]))), 0.1)
-    scales = ScalarMappable(Normalize(-90, 90), "turbo"), ScalarMappable(Normalize(-limit, limit), "RdBu_r")
-    figure = style.figure(8.6, 7.6)
-    panels = figure.subplots(2, len(states), squeeze=False, subplot_kw={"projection": "3d", "computed_zorder": False})
-    for column, state in zip(panels.T, states, strict=True):
-        wall = _cut(_grid(state.nodes, cells, {"strain": 100 * state.strain, "helix": np.degrees(helix)}))
-        add(column[0], wall, GROUND * scales[0].to_rgba(wall.point_data["helix"])[:, :3])
-        rods = _rods(state, cells, helix)
-        add(column[0], rods, scales[0].to_rgba(rods.point_data["helix"])[:, :3])
-        add(column[1], wall, scales[1].to_rgba(wall.point_data["strain"])[:, :3])
-        column[0].set_title(state.name, y=1.25)
-    show(panels.flat, np.concatenate([state.nodes for state in states]))
-    labels = "Helix angle (°)", "Circumferential strain $E_{CC}$\nfrom unloaded (%)"
-    for row, scale, label in zip(panels, scales, labels, strict=True):
-        figure.colorbar(scale, ax=row, shrink=0.75, aspect=25).set_label(label)
+    cells, fibre, helix, strain = (of_cells[real] for of_cells in (cells, fibre, helix, strain))
+    nodes = np.nan_to_num(nodes)
+    angle, percent = (ScalarMappable(Normalize(-end, end), name) for end, name in SCALES)
+    figure = style.figure(8.6, 4.2)
+    projection = {"projection": "3d", "computed_zorder": False}
+    panels = figure.subplots(1, 1 + len(STRAINS), squeeze=False, subplot_kw=projection)[0]
+    wall = _cut(_grid(nodes[0], cells, {"helix": np.degrees(helix)}))
+    add(panels[0], wall, GROUND * angle.to_rgba(wall.point_data["helix"])[:, :3])
+    rods = _rods(nodes[0], fibre, cells, helix)
+    add(panels[0], rods, angle.to_rgba(rods.point_data["helix"])[:, :3])
+    panels[0].set_title("Fibres at end-diastole", y=1.12)
+    for panel, number in zip(panels[1:], STRAINS.values(), strict=True):
+        wall = _cut(_grid(nodes[1], cells, {"strain": 100 * strain[:, number]}))
+        add(panel, wall, percent.to_rgba(wall.point_data["strain"])[:, :3])
+        panel.set_title("End-systole", y=1.12)
+    show(panels, np.concatenate(nodes))
+    bar: dict[str, Any] = {"orientation": "horizontal", "shrink": 0.8, "pad": 0.12, "aspect": 22}
+    names = ("Helix angle (°)", *(style.QUANTITIES[name].label for name in STRAINS))
+    for panel, scale, name in zip(panels, (angle, percent, percent), names, strict=True):
+        figure.colorbar(scale, ax=panel, **bar).set_label(name)
     return figure
 
 
@@ -91,22 +85,22 @@ def _grid(nodes: np.ndarray, cells: np.ndarray, values: dict[str, np.ndarray]) -
 
 
 def _cut(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
-    """Surface of the wall without the anterior lateral quarter."""
-    anterior_septal = grid.clip("y", origin=(0, 0, 0), invert=False).clip("-x", origin=(0, 0, 0))
-    remaining = grid.clip("y", origin=(0, 0, 0)) + anterior_septal
+    """Surface of the wall without the inferior lateral quarter."""
+    inferior_septal = grid.clip("-y", origin=(0, 0, 0), invert=False).clip("-x", origin=(0, 0, 0))
+    remaining = grid.clip("-y", origin=(0, 0, 0)) + inferior_septal
     surface = remaining.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2).triangulate()
     return surface.subdivide_adaptive(max_edge_len=surface.length / 40)  # small triangles can be sorted by their depth
 
 
-def _rods(state: State, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyData:
+def _rods(nodes: np.ndarray, fibre: np.ndarray, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyData:
     """Short rods along the fibres, outside the quarter that is cut away."""
-    position = shape(CENTROID)[0] @ state.nodes[cells]
-    shown = (position[:, 1] <= 0) | (position[:, 0] >= 0)
+    position = shape(CENTROID)[0] @ nodes[cells]
+    shown = (position[:, 1] >= 0) | (position[:, 0] >= 0)
     points = pyvista.PolyData(position[shown])
-    points["direction"] = state.fibre[shown]
+    points["direction"] = fibre[shown]
     points["helix"] = np.degrees(helix[shown])
     rod = pyvista.Cylinder(radius=0.055, height=1.0, resolution=6)
-    length = ROD_LENGTH * np.ptp(state.nodes[:, 2])
+    length = ROD_LENGTH * np.ptp(nodes[:, 2])
     return points.glyph(orient="direction", scale=False, factor=length, geom=rod).triangulate()
 
 
@@ -116,8 +110,8 @@ def show(panels: Iterable[Axes3D], nodes: np.ndarray) -> None:
     for panel in panels:
         panel.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         panel.set_proj_type("ortho")
-        panel.set_box_aspect(high - low, zoom=1.5)
-        panel.view_init(ELEVATION, AZIMUTH)
+        panel.set_box_aspect(high - low, zoom=1.45)
+        panel.view_init(ELEVATION, AZIMUTH, ROLL)
         panel.axis("off")
 
 

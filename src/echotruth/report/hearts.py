@@ -7,19 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.report.clips import jpeg_address
+from echotruth.report import style
+from echotruth.report.clips import QUALITY, address
 from echotruth.repository.reader import Repository
 
 MEASURES = {
     "Ejection fraction (%)": ("ejection_fraction", 100.0),
     "GLS (%)": ("gls", 100.0),
-    "Circumferential strain (%)": ("circumferential_strain", 100.0),
-    "Twist at ES (deg)": ("twist_es", float(np.degrees(1))),
+    "E_CC (%)": ("circumferential_strain", 100.0),
+    "Twist at ES (°)": ("twist_es", style.FACTORS["°"]),
 }
 """Label -> array of the group `physiology`, and the factor to the unit of the label."""
-
-UNIT_OF_VOLUME = 1e-9
-"""uL, in m^3."""
 
 SHOWN = 24
 """Largest number of hearts of which there is a row with a picture."""
@@ -55,7 +53,7 @@ def subjects(repository: Repository, view: str, size: int) -> list[dict[str, Any
     Returns
     -------
     list of dict
-        At most `SHOWN`, each with `case`, `status`, `diagnosis`, `volume` (end-diastolic, uL), `measures` (as
+        At most `SHOWN`, each with `case`, `status`, `diagnosis`, `volume` (end-diastolic, m^3), `measures` (as
         `MEASURES`) and `picture` (as :func:`picture` returns it); numbers are NaN where the heart has none.
     """
     imaged = repository.shown
@@ -67,7 +65,7 @@ def subjects(repository: Repository, view: str, size: int) -> list[dict[str, Any
             "case": case,
             "status": str(repository.cases.at[case, "status"]),
             "diagnosis": str(repository.cases.at[case, "diagnosis"]),
-            "volume": float(repository.read("mechanics/volume", case, None, 0)) / UNIT_OF_VOLUME,
+            "volume": float(repository.read("mechanics/volume", case, None, 0)),
             "measures": [float(values[k]) for values in found.values()],
             "picture": picture(repository.read(f"bmode/{size}/image", case, view, 0)),
         }
@@ -93,4 +91,4 @@ def picture(image: NDArray[np.uint8]) -> str:
     # Pillow pads with black what lies beyond the image.
     box = int(column) - half, int(row) - half, int(column) + half, int(row) + half
     small = Image.fromarray(image).crop(box).resize((THUMBNAIL, THUMBNAIL), Image.Resampling.LANCZOS)
-    return jpeg_address(small)
+    return address(small, "jpeg", quality=QUALITY, optimize=True)

@@ -1,5 +1,6 @@
 """Target and solved pressure-volume loop of the heart, with the active tension that drives it."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,9 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from echotruth.report import style
-
-UL = 1e-9
-"""m^3."""
 
 
 @style.styled
@@ -32,35 +30,39 @@ def draw(time: np.ndarray, es: int, tension: np.ndarray, solved: np.ndarray, tar
         return style.sentence(text, height=4.2)
     figure = style.figure(8.4, 4.2)
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.1, 1))[0]
-    _loop(left.subplots(), es, solved, target)
+    quantities = style.QUANTITIES["pressure"], style.volume(np.nanmax(solved[1]))
+    _loop(left.subplots(), es, solved, target, quantities)
     axes = right.subplots(3, 1, sharex=True)
     axes[0].plot(time * 1e3, tension / 1e3, color=style.SOLVED)
     axes[0].set_ylabel("$T_{Ca}$ (kPa)")
-    for panel, name, unit, k in ((axes[1], "Pressure (mmHg)", style.MMHG, 0), (axes[2], "Volume (µL)", UL, 1)):
-        panel.plot(time * 1e3, target[k] / unit, color=style.TARGET, linewidth=4)
-        panel.plot(time * 1e3, solved[k] / unit, color=style.SOLVED)
-        panel.set_ylabel(name)
+    for panel, shown, wanted, found in zip(axes[1:], quantities, target, solved, strict=True):
+        panel.plot(time * 1e3, shown.factor * wanted, color=style.TARGET, linewidth=4)
+        panel.plot(time * 1e3, shown.factor * found, color=style.SOLVED)
+        panel.set_ylabel(f"{shown.words} ({shown.unit})")
     for panel in axes:
-        panel.axvline(time[es] * 1e3, color=style.RADIAL, linewidth=0.9, linestyle=":")
+        panel.axvline(time[es] * 1e3, color=style.MUTED, linewidth=0.9, linestyle=":")
         panel.margins(x=0.01)
-    axes[0].text(time[es] * 1e3, 1.02, "ES", color=style.RADIAL, ha="center", transform=axes[0].get_xaxis_transform())
+    axes[0].text(time[es] * 1e3, 1.02, "ES", color=style.MUTED, ha="center", transform=axes[0].get_xaxis_transform())
     axes[2].set_xlabel("Time since end-diastole (ms)")
     right.align_ylabels()
     return figure
 
 
-def _loop(axes: Axes, es: int, solved: np.ndarray, target: np.ndarray) -> None:
+def _loop(axes: Axes, es: int, solved: np.ndarray, target: np.ndarray, shown: Sequence[style.Quantity]) -> None:
+    factors = np.array([[quantity.factor] for quantity in shown])
+    solved, target = factors * solved, factors * target
     followed = bool(np.isfinite(target).all(axis=0).any())
     curves = ((target, style.TARGET, 4, "target"), (solved, style.SOLVED, 1.6, "solved"))
     for curve, colour, width, label in curves[0 if followed else 1 :]:
         pressure, volume = np.column_stack([curve, curve[:, :1]])
-        axes.plot(volume / UL, pressure / style.MMHG, color=colour, linewidth=width, label=label)
+        axes.plot(volume, pressure, color=colour, linewidth=width, label=label)
     for frame, name, offset in ((0, "ED", (15, 0)), (es, "ES", (-13, 8))):
-        point = solved[1, frame] / UL, solved[0, frame] / style.MMHG
-        axes.plot(*point, "o", color=style.RADIAL, markersize=5, zorder=5)
-        look: dict[str, Any] = {"color": style.RADIAL, "fontweight": "bold", "ha": "center", "va": "center"}
+        point = solved[1, frame], solved[0, frame]
+        axes.plot(*point, "o", color=style.MUTED, markersize=5, zorder=5)
+        look: dict[str, Any] = {"color": style.MUTED, "fontweight": "bold", "ha": "center", "va": "center"}
         axes.annotate(name, point, offset, textcoords="offset points", **look)
-    axes.set(xlabel="Volume (µL)", ylabel="Pressure (mmHg)", title="Pressure-volume loop")
+    y, x = (f"{quantity.words} ({quantity.unit})" for quantity in shown)
+    axes.set(xlabel=x, ylabel=y, title="Pressure-volume loop")
     axes.set_ylim(bottom=0)
     axes.margins(0.1)
     if followed:

@@ -3,16 +3,19 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 
 from echotruth import files
 from echotruth.cases.labels import diagnosis
 from echotruth.config import shipped
 from echotruth.evaluation.leaderboard import best
 from echotruth.report import account, board, style, vector
-from echotruth.report.clips import STRAIN_LIMIT, clips
+from echotruth.report.clips import clips
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import MEASURES, subjects
 from echotruth.repository import inferred
@@ -51,10 +54,11 @@ def _context(repository: Repository) -> dict[str, Any]:
     standings = pd.read_csv(folder / "figures/leaderboard.csv") if case else None
     order = [name for name in best(standings) if name in repository.trackers] if standings is not None else []
     comparison = Comparison(repository, repository.case(case), tuple(order)) if case else None
+    hearts = subjects(repository, view, config.bmode.sizes[-1]) if shown else []
     return {
         "config": config,
         "packages": repository.attributes("").get("packages", {}),
-        "css": Markup((HERE / "page.css").read_text(encoding="utf-8")),
+        "css": Markup(_colours() + (HERE / "page.css").read_text(encoding="utf-8")),
         "script": Markup((HERE / "player.js").read_text(encoding="utf-8")),
         "figure": lambda name, title: Markup(vector.inline(folder / f"figures/{name}.svg", title)),
         "title": style.title,
@@ -66,14 +70,23 @@ def _context(repository: Repository) -> dict[str, Any]:
         "shown": shown,
         "best": comparison.trackers[0] if comparison else "",
         "main_view": view,
-        "strain_limit": STRAIN_LIMIT,
+        "strain_limit": style.STRAIN_LIMIT,
+        "strain_colours": [to_hex(colour) for colour in colormaps[style.SIGNED](np.linspace(0, 1, 17))],
         "clips": clips(comparison) if comparison else None,
         "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
         "measures": list(MEASURES),
-        "hearts": subjects(repository, view, config.bmode.sizes[-1]) if shown else [],
+        "hearts": hearts,
+        "volume": style.volume(max((one["volume"] for one in hearts), default=0.0)),
         "inferred": account.inference(repository, inferred.read(folder / inferred.FILE)) if infers else None,
         "failures": account.failures(repository),
         "stages": account.stages(folder),
         "configuration": (folder / "config.yaml").read_text(encoding="utf-8"),
         "paper": shipped.citation()["preferred-citation"],
     }
+
+
+def _colours() -> str:
+    """The colours of figures as variables of a style sheet, which replaces them where the paper is dark."""
+    named = {name: colour for colour, name in vector.VARIABLES.items()}
+    named |= {"motion": style.MOTION, "tracked": style.TRACKED}
+    return ":root { " + " ".join(f"--{name}: {colour};" for name, colour in named.items()) + " }\n"

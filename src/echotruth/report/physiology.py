@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from echotruth.report import style
@@ -32,14 +34,16 @@ al., J Magn Reson Imaging 42 (2015) 153, doi 10.1002/jmri.24749; E_LL = e + e^2 
 501 people, PMC5234340.
 """
 
-COMPONENTS = ("RR", "CC", "LL", "RC", "RL", "CL")
-NORMAL = {"RR": style.RADIAL, "CC": style.CIRCUMFERENTIAL, "LL": style.LONGITUDINAL}
-SHEAR = {"RC": "#8a4f9e", "RL": "#c98a1b", "CL": "#2f9aa0"}
-"""Component -> colour."""
+NORMAL, SHEAR = ("RR", "CC", "LL"), ("RC", "RL", "CL")
+COMPONENTS = NORMAL + SHEAR
+"""Strains in the order of the arrays."""
+
+LEVELS = ("basal", "upper", "middle", "lower", "apical")
+"""Of the wall, in the order of the arrays."""
 
 HEADROOM = 0.06
 """Room above the curves for the names of phases, over the height of the others."""
-_UL, _MM = 1e-9, 1e-3
+_MM = 1e-3
 
 Cycle = dict[str, NDArray[Any]]
 """Arrays of the groups `mechanics`, `kinematics` and `physiology` of one heart, and `time`, (frame,), s.
@@ -50,73 +54,99 @@ The pressure and the volume of a prescribed motion are not numbers, and nor are 
 
 @style.styled
 def draw(cycle: Cycle, published: Published) -> Figure:
-    """Draw rotation, strain, also by level from base to apex, axial motion, pressure and volume over one cycle.
+    """Draw rotation, strain, at end-systole also by level from base to apex, axial motion, pressure and volume.
 
     `published` is an entry of `PUBLISHED`, or empty.
     """
-    figure = style.figure(8.6, 8.8)
-    panels = figure.subplots(3, 3, sharex=True)
-    (turn, normal, shear), levels, (axial, pressure, volume) = panels
+    figure = style.figure(11.4, 6.2)
+    panels = figure.subplots(2, 4)
+    (turn, normal, shear, levels), (axial, pressure, volume, legend) = panels
     _rotations(turn, cycle, published)
     _strains(normal, cycle, NORMAL, published)
     _strains(shear, cycle, SHEAR, published)
-    for panel, values in zip(levels, _by_level(cycle), strict=True):
-        _levels(panel, cycle, 100 * values)
     _axial_motion(axial, cycle)
-    _curve(pressure, cycle, cycle["pressure"] / style.MMHG, "Pressure (mmHg)")
-    _curve(volume, cycle, cycle["volume"] / _UL, "Volume (µL)")
-    for panel, title in zip(panels.flat, _TITLES, strict=True):
+    _curve(pressure, cycle, cycle["pressure"], style.QUANTITIES["pressure"])
+    _curve(volume, cycle, cycle["volume"], style.volume(np.nanmax(cycle["volume"], initial=0.0)))
+    for panel, title in zip((turn, normal, shear, axial, pressure, volume), _TITLES, strict=True):
         panel.set_title(title, loc="left")
-        _phases(panel, cycle)
-    for panel in panels[-1]:
         panel.set_xlabel("Time since end-diastole (ms)")
+        _phases(panel, cycle)
+    _levels(levels, cycle)
+    _explain(legend, published)
     return figure
 
 
-_TITLES = (
-    *("Rotation", "Normal strain", "Shear strain"),
-    *("Circumferential by level", "Radial by level", "Along the fibres by level"),
-    *("Axial motion", "Pressure", "Volume"),
-)
-LEVELS = {"basal": "#1b4965", "upper": "#2f7fa8", "middle": "#5fae8b", "lower": "#d69c2f", "apical": "#b8432f"}
-"""Level of the wall -> colour."""
+_TITLES = ("Rotation", "Normal strain", "Shear strain", "Axial motion", "Pressure", "Volume")
 
 
-def _by_level(cycle: Cycle) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """E_CC, E_RR and the strain along the fibres, each (frame, level)."""
-    strain = cycle["level_strain"]
-    return strain[..., COMPONENTS.index("CC")], strain[..., COMPONENTS.index("RR")], cycle["level_fibre_strain"]
-
-
-def _levels(axes: Axes, cycle: Cycle, values: np.ndarray) -> None:
-    for (name, colour), of_level in zip(LEVELS.items(), values.T, strict=True):
-        _line(axes, cycle, name, of_level, colour)
-    axes.set_ylabel("Mean of the level since ED (%)")
-    _finish(axes, 0.1, columns=2)
-
-
-def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
-    _line(axes, cycle, "base", np.degrees(cycle["rotation_base"]), style.BASE)
-    _line(axes, cycle, "apex", np.degrees(cycle["rotation_apex"]), style.APEX)
-    _line(axes, cycle, "twist", np.degrees(cycle["twist"]), style.TWIST)
-    _measured(axes, cycle, {"twist": style.TWIST}, published)
-    axes.set_ylabel("Counter-clockwise from apex (deg)")
+def _levels(axes: Axes, cycle: Cycle) -> None:
+    """Strain of the levels at end-systole, the basal one on the left."""
+    es = cycle["es_frame"]
+    shown = {name: cycle["level_strain"][es, :, COMPONENTS.index(name)] for name in ("CC", "LL")}
+    shown["ff"] = cycle["level_fibre_strain"][es]
+    for name, values in shown.items():
+        quantity = style.QUANTITIES[name]
+        axes.plot(LEVELS, quantity.factor * values, "o-", color=quantity.colour, markersize=4, label=quantity.tex)
+    axes.axhline(0, color=style.MUTED, linewidth=0.6)
+    axes.set_title("By level at end-systole", loc="left")
+    axes.set_ylabel("Mean since end-diastole (%)")
+    axes.tick_params(axis="x", labelsize=8)
     _finish(axes, 0.1)
 
 
-def _strains(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
-    for name, colour in colours.items():
-        _line(axes, cycle, f"$E_{{{name}}}$", 100 * cycle["strain_mean"][:, COMPONENTS.index(name)], colour)
-    _measured(axes, cycle, colours, published)
-    axes.set_ylabel("Wall mean since ED (%)")
+def _explain(axes: Axes, published: Published) -> None:
+    """What marks mean that stand in several panels."""
+    axes.axis("off")
+    marks = [
+        Patch(color=style.SHADE, label="isovolumic contraction (IVC)\nand relaxation (IVR)"),
+        Line2D(
+            [],
+            [],
+            color=style.MUTED,
+            linewidth=0.9,
+            linestyle=":",
+            label="end-systole (ES), of which\nlegends give the values",
+        ),
+    ]
+    if published:
+        bar = Line2D(
+            [],
+            [],
+            color=style.MUTED,
+            linewidth=5,
+            alpha=0.35,
+            solid_capstyle="butt",
+            label="measured in animals or people,\nmean ± standard deviation",
+        )
+        ring = Line2D(
+            [], [], color=style.MUTED, marker="o", ls="none", fillstyle="none", label="measured at the end of IVC"
+        )
+        marks += [bar, ring]
+    axes.legend(handles=marks, loc="center left", fontsize=8, labelspacing=1.1)
+
+
+def _rotations(axes: Axes, cycle: Cycle, published: Published) -> None:
+    for name, values in (("base", "rotation_base"), ("apex", "rotation_apex"), ("twist", "twist")):
+        _line(axes, cycle, name, style.FACTORS["°"] * cycle[values], style.QUANTITIES[name].colour)
+    _measured(axes, cycle, ("twist",), published)
+    axes.set_ylabel("Counter-clockwise from apex (°)")
+    _finish(axes, 0.1)
+
+
+def _strains(axes: Axes, cycle: Cycle, names: tuple[str, ...], published: Published) -> None:
+    for name in names:
+        quantity, number = style.QUANTITIES[name], COMPONENTS.index(name)
+        _line(axes, cycle, quantity.tex, quantity.factor * cycle["strain_mean"][:, number], quantity.colour)
+    _measured(axes, cycle, names, published)
+    axes.set_ylabel("Wall mean since end-diastole (%)")
     _finish(axes, 0.1)
 
 
 def _axial_motion(axes: Axes, cycle: Cycle) -> None:
-    for name, colour in (("base", style.BASE), ("apex", style.APEX)):
-        _line(axes, cycle, name, cycle[f"{name}_motion"] / _MM, colour, decimals=2)
+    for name in ("base", "apex"):
+        _line(axes, cycle, name, cycle[f"{name}_motion"] / _MM, style.QUANTITIES[name].colour, decimals=2)
     axes.set_ylabel("Towards the base (mm)")
-    _finish(axes, 0.01, 0.2)
+    _finish(axes, 0.01)
 
 
 def _line(axes: Axes, cycle: Cycle, name: str, values: np.ndarray, colour: str, decimals: int = 1) -> None:
@@ -126,25 +156,25 @@ def _line(axes: Axes, cycle: Cycle, name: str, values: np.ndarray, colour: str, 
     axes.plot(cycle["time"] * 1e3, values, color=colour, label=label)
 
 
-def _curve(axes: Axes, cycle: Cycle, values: np.ndarray, label: str) -> None:
-    axes.set_ylabel(label)
+def _curve(axes: Axes, cycle: Cycle, values: np.ndarray, quantity: style.Quantity) -> None:
+    axes.set_ylabel(f"{quantity.words} ({quantity.unit})")
     if not np.isfinite(values).any():
         axes.text(0.5, 0.5, "none: the motion is prescribed", color=style.MUTED, ha="center", transform=axes.transAxes)
         axes.set_yticks([])
         return
-    axes.plot(cycle["time"] * 1e3, values, color=style.SOLVED)
-    axes.set_ylim(0, 1.15 * np.max(values))
+    axes.plot(cycle["time"] * 1e3, quantity.factor * values, color=style.SOLVED)
+    axes.set_ylim(0, 1.15 * quantity.factor * np.max(values))
 
 
-def _measured(axes: Axes, cycle: Cycle, colours: dict[str, str], published: Published) -> None:
+def _measured(axes: Axes, cycle: Cycle, names: tuple[str, ...], published: Published) -> None:
     """Bars of mean and standard deviation beside end-systole, and a circle at 0 at the end of IVC."""
     step, end = 0.045 * 1e3 * cycle["time"][-1], 1e3 * cycle["time"][cycle["es_frame"]]
-    shown = [name for name in colours if name in published]
+    shown = [name for name in names if name in published]
     for k, name in enumerate(shown):
-        mean, sd = published[name]
+        (mean, sd), colour = published[name], style.QUANTITIES[name].colour
         at = end + (k - (len(shown) - 1) / 2) * step
-        axes.plot([at, at], [mean - sd, mean + sd], color=colours[name], linewidth=5, alpha=0.35, solid_capstyle="butt")
-        axes.plot(at, mean, "_", color=colours[name], markersize=7, markeredgewidth=1.6)
+        axes.plot([at, at], [mean - sd, mean + sd], color=colour, linewidth=5, alpha=0.35, solid_capstyle="butt")
+        axes.plot(at, mean, "_", color=colour, markersize=7, markeredgewidth=1.6)
     if shown and np.isfinite(cycle["ivc_time"]):
         axes.plot(1e3 * cycle["ivc_time"], 0, "o", color=style.MUTED, markersize=6, markerfacecolor="none", zorder=5)
 
@@ -166,10 +196,10 @@ def _phases(axes: Axes, cycle: Cycle) -> None:
         axes.annotate(name, (start, 0.985), (2, 0), xycoords=top, **look)
 
 
-def _finish(axes: Axes, smallest: float, below: float = 0.02, columns: int = 3) -> None:
+def _finish(axes: Axes, smallest: float) -> None:
     """Give the axis a smallest limit to both sides, lest it show rounding errors, and values at ES below it."""
     low, high = axes.get_ylim()
     low, high = min(low, -smallest), max(high, smallest)
     axes.set_ylim(low, high + HEADROOM * (high - low))
     spaces: dict[str, Any] = {"columnspacing": 0.9, "handlelength": 1, "handletextpad": 0.5, "borderaxespad": 0.2}
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -below), ncols=columns, fontsize=8, **spaces)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3, fontsize=8, **spaces)

@@ -1,12 +1,12 @@
 "use strict";
 (() => {
   const clips = JSON.parse(document.getElementById("clips").textContent);
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name);
   const canvas = document.getElementById("screen"), pen = canvas.getContext("2d");
   const slider = document.getElementById("frame"), clock = document.getElementById("clock");
   const play = document.getElementById("play"), course = document.getElementById("course");
   const shows = (name) => { const box = document.getElementById("show-" + name); return box && box.checked && !box.disabled; };
-  const RATE = 20, GAP = -32768, NO_STRAIN = -128;
-  const sheet = document.createElement("canvas");
+  const RATE = 20, GAP = -32768;
   let clip = null, frame = 0, playing = false, last = 0;
 
   function bytes(text) {
@@ -20,7 +20,9 @@
       one.picture.onload = draw;
       one.picture.src = one.sheet;
       one.paths = new Int16Array(bytes(one.path));
-      one.strains = new Int8Array(bytes(one.strain));
+      one.tint = new Image();
+      one.tint.onload = draw;
+      one.tint.src = one.colours;
       one.found = one.tracked && new Int16Array(bytes(one.tracked));
     }
     return one;
@@ -40,41 +42,14 @@
     }
     const box = document.getElementById("show-tracked");
     if (box) box.disabled = !clip.found;
+    document.getElementById("strain-name").textContent = clip.strain_name;
     drawCourse();
     draw();
-  }
-
-  function strainColour(percent) {
-    const stops = [[33, 102, 172], [146, 197, 222], [247, 247, 247], [244, 165, 130], [178, 24, 43]];
-    const place = Math.min(Math.max((percent / clip.strain_limit + 1) * 2, 0), 3.999), k = Math.floor(place);
-    const mix = stops[k].map((low, i) => Math.round(low + (place - k) * (stops[k + 1][i] - low)));
-    return "rgb(" + mix.join(",") + ")";
   }
 
   function at(array, count, t, k) {
     const i = 2 * (t * count + k);
     return array[i] === GAP || array[i + 1] === GAP ? null : [array[i] / clip.steps, array[i + 1] / clip.steps];
-  }
-
-  function drawStrain() {
-    // On a sheet of its own, so that neighbours that overlap do not add up.
-    sheet.width = canvas.width;
-    sheet.height = canvas.height;
-    const pen = sheet.getContext("2d"), density = canvas.width / clip.width;
-    pen.setTransform(density, 0, 0, density, 0, 0);
-    for (let k = 0; k < clip.points; k++) {
-      const place = at(clip.paths, clip.points, frame, k), value = clip.strains[frame * clip.points + k];
-      if (!place || value === NO_STRAIN) continue;
-      pen.fillStyle = strainColour(value);
-      pen.fillRect(place[0] - clip.radius, place[1] - clip.radius, 2 * clip.radius, 2 * clip.radius);
-    }
-    overlay(sheet);
-  }
-
-  function overlay(picture) {
-    pen.globalAlpha = 0.62;
-    pen.drawImage(picture, 0, 0, clip.width, clip.height);
-    pen.globalAlpha = 1;
   }
 
   function drawMotion(array, count, numbers, colour, ring) {
@@ -105,14 +80,18 @@
     pen.globalAlpha = 1;
     pen.fillStyle = "#000";
     pen.fillRect(0, 0, clip.width, clip.height);
-    if (clip.picture.complete && clip.picture.naturalWidth) {
+    const drawn = (picture) => {
+      if (!picture.complete || !picture.naturalWidth) return;
       const box = [clip.width, clip.height];
-      pen.drawImage(clip.picture, column * box[0], row * box[1], box[0], box[1], 0, 0, box[0], box[1]);
-    }
-    if (shows("strain")) drawStrain();
-    if (shows("true")) drawMotion(clip.paths, clip.points, clip.chosen, "#ffb000", false);
+      pen.drawImage(picture, column * box[0], row * box[1], box[0], box[1], 0, 0, box[0], box[1]);
+    };
+    drawn(clip.picture);
+    pen.globalAlpha = 0.6;
+    if (shows("strain")) drawn(clip.tint);
+    pen.globalAlpha = 1;
+    if (shows("true")) drawMotion(clip.paths, clip.points, clip.chosen, colour("motion"), false);
     if (shows("tracked") && clip.found) {
-      drawMotion(clip.found, clip.chosen.length, clip.chosen.map((_, k) => k), "#4cc9f0", true);
+      drawMotion(clip.found, clip.chosen.length, clip.chosen.map((_, k) => k), colour("tracked"), true);
     }
     pen.globalAlpha = 1;
     pen.fillStyle = pen.strokeStyle = "#fff";
@@ -155,8 +134,8 @@
       return `<path d="${pieces}" fill="none" stroke="${colour}" stroke-width="${width}"/>`;
     };
     parts.push(line(clip.course.true, "var(--ink)", 2.6));
-    if (clip.course.tracked) parts.push(line(clip.course.tracked, "var(--accent)", 1.5));
-    parts.push(`<line id="cursor" y1="${BOX.top}" y2="${BOX.height - BOX.bottom}" stroke="var(--radial)" stroke-width="1.2"/>`);
+    if (clip.course.tracked) parts.push(line(clip.course.tracked, "var(--series-0)", 1.5));
+    parts.push(`<line id="cursor" y1="${BOX.top}" y2="${BOX.height - BOX.bottom}" stroke="var(--muted)" stroke-width="1.2"/>`);
     const end = clip.time_ms[clip.frames - 1];
     parts.push(`<text x="${BOX.left}" y="${BOX.height - 8}">0</text>`);
     parts.push(`<text x="${BOX.width - BOX.right}" y="${BOX.height - 8}" text-anchor="end">${end.toFixed(0)} ms</text>`);

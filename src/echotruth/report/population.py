@@ -47,7 +47,7 @@ def _diagnosis(axes: Axes, values: np.ndarray, place: int) -> None:
     dots = values[:: -(-len(values) // MAX_DOTS)]
     # Fractions of the golden ratio spread dots evenly in any number of them, without chance.
     height = place + SPREAD * (2 * (np.arange(len(dots)) * 0.6180339887 % 1) - 1) * (len(dots) > 1)
-    axes.plot(dots, height, "o", color=style.CIRCUMFERENTIAL, markersize=3.2, alpha=0.55, markeredgewidth=0)
+    axes.plot(dots, height, "o", color=style.SERIES[0], markersize=3.2, alpha=0.55, markeredgewidth=0)
     if len(values) > 3:
         low, middle, high = np.quantile(values, (0.25, 0.5, 0.75))
         axes.plot([low, high], [place, place], color=style.INK, linewidth=1.6)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from echotruth.report import style
 
-DIRECTIONS = (("RR", style.RADIAL), ("CC", style.CIRCUMFERENTIAL), ("LL", style.LONGITUDINAL))
+DIRECTIONS = ("RR", "CC", "LL")
 """Normal strains in the order of the arrays."""
 
 MIN_AXIS_LIMIT = 0.1
@@ -31,17 +31,17 @@ def draw(time: np.ndarray, es: int, mean: np.ndarray, sd: np.ndarray, layers: np
     """
     figure = style.figure(8.6, 4.2)
     left, right = figure.subplots(1, 2)
-    for k, (name, colour) in enumerate(DIRECTIONS):
-        average, deviation = 100 * mean[:, k], 100 * sd[:, k]
-        label = f"$E_{{{name}}}$ {average[es]:+.1f} ± {deviation[es]:.1f}".replace("-", "−")
+    for k, strain in enumerate(style.QUANTITIES[name] for name in DIRECTIONS):
+        average, deviation, colour = 100 * mean[:, k], 100 * sd[:, k], strain.colour
+        label = f"{strain.tex} {average[es]:+.1f} ± {deviation[es]:.1f}".replace("-", "−")
         left.fill_between(time * 1e3, average - deviation, average + deviation, color=colour, alpha=0.18, linewidth=0)
         left.plot(time * 1e3, average, color=colour, label=label)
-    left.set(title="Wall mean ± standard deviation", ylabel="Strain since ED (%)")
+    left.set(title="Wall mean ± standard deviation", ylabel="Strain since end-diastole (%)")
     count = layers.shape[1]
     for k, colour in enumerate(style.layer_colours(count)):
         border = {0: " endo", count - 1: " epi"}.get(k, "")
         right.plot(time * 1e3, 100 * layers[:, k, 1], color=colour, label=f"{k + 1}{border}")
-    right.set(title="Circumferential strain by layer", ylabel="$E_{CC}$ since ED (%)")
+    right.set(title="By layer since end-diastole", ylabel=style.QUANTITIES["CC"].label)
     for panel, columns, name in ((left, 3, "at ES (%)"), (right, min(count, 6), "layer")):
         place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.16), "ncols": columns}
         panel.legend(title=name, columnspacing=1, handlelength=1.2, **place)

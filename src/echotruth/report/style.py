@@ -1,8 +1,13 @@
-"""Style shared by all figures."""
+"""What all pictures share: the colour, sign, unit and name of each quantity, and the style of figures.
+
+Report, viewer, exported clips and the pictures of the docs take them from here. Strain is in percent and shortening,
+which is negative, is blue; angles are in degrees. The apex is up in long axes and in space, as in an apical echo, where
+the probe is at the top, and in the middle of a bullseye.
+"""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -18,12 +23,6 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from echotruth.imaging.labels import TissueLabel
 from echotruth.section import UNITS
 
-RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
-"""Colours of the wall directions."""
-
-BASE, APEX, TWIST = "#2f9aa0", "#c8641b", "#1b2026"
-"""Colours of the base, the apex and the twist between them."""
-
 INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
 """Colours of text and axes, of remarks, of grid lines, of shaded spans, and of the paper."""
 
@@ -36,8 +35,94 @@ TARGET, SOLVED = "#9a9fa5", INK
 TRUTH = INK
 """Colour of what is true."""
 
-SERIES = ("#1f5fa8", "#c8641b", "#2f8550", "#8a4f9e", "#2f9aa0", "#a87f13")
-"""Colours of trackers, in the order of their ranks; further trackers are grey."""
+
+class Quantity(NamedTuple):
+    """How a quantity is shown everywhere.
+
+    Attributes
+    ----------
+    words : str
+    symbol : str
+        As docs/metrics.md and the store write it.
+    unit : str
+        A key of `FACTORS`.
+    colour : str
+        Of its curves.
+    """
+
+    words: str
+    symbol: str
+    unit: str
+    colour: str
+
+    @property
+    def factor(self) -> float:
+        """From SI to the unit."""
+        return FACTORS[self.unit]
+
+    @property
+    def tex(self) -> str:
+        """The symbol with what follows its underscore as an index, as Matplotlib draws it."""
+        letter, _, index = self.symbol.partition("_")
+        return f"${letter}_{{{index}}}$" if index else letter
+
+    @property
+    def plain(self) -> str:
+        """Name and unit in plain text."""
+        return f"{self.words} {self.symbol} ({self.unit})"
+
+    @property
+    def label(self) -> str:
+        """Name and unit, for an axis or a colour bar of Matplotlib."""
+        return f"{self.words} {self.tex} ({self.unit})"
+
+
+RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
+"""Colours of the wall directions."""
+
+QUANTITIES = {
+    "RR": Quantity("Radial strain", "E_RR", "%", RADIAL),
+    "CC": Quantity("Circumferential strain", "E_CC", "%", CIRCUMFERENTIAL),
+    "LL": Quantity("Longitudinal strain", "E_LL", "%", LONGITUDINAL),
+    "RC": Quantity("Radial-circumferential shear", "E_RC", "%", "#8a4f9e"),
+    "RL": Quantity("Radial-longitudinal shear", "E_RL", "%", "#c98a1b"),
+    "CL": Quantity("Circumferential-longitudinal shear", "E_CL", "%", "#6b7a1f"),
+    "ff": Quantity("Strain along the fibres", "E_ff", "%", "#7d6a55"),
+    "GCS": Quantity("Circumferential strain", "GCS", "%", CIRCUMFERENTIAL),
+    "GLS": Quantity("Longitudinal strain", "GLS", "%", LONGITUDINAL),
+    "base": Quantity("Rotation", "of the base", "°", "#2f9aa0"),
+    "apex": Quantity("Rotation", "of the apex", "°", "#c8641b"),
+    "twist": Quantity("Twist,", "apex less base", "°", INK),
+    "pressure": Quantity("Pressure", "in the cavity", "mmHg", INK),
+}
+"""Green-Lagrange strain of the tissue by its components, strain of the mid-wall contour (docs/metrics.md), and
+rotation, which is positive counter-clockwise as seen from the apex."""
+
+FACTORS = {"%": 100.0, "°": float(np.degrees(1)), "mmHg": 1 / UNITS["mmHg"], "µL": 1e9, "mL": 1e6}
+"""Unit -> factor from SI."""
+
+MAX_VOLUME_IN_UL = 2e-6
+"""Largest volume that is shown in µL, m^3; larger ones are in mL."""
+
+ALONG = {"short_axis": "CC", "long_axis": "LL"}
+"""Plane of a view -> strain along the wall in it."""
+
+GLOBAL = {"short_axis": "GCS", "long_axis": "GLS"}
+"""Plane of a view -> strain of the mid-wall contour in it."""
+
+SIGNED, UNSIGNED = "RdBu_r", "viridis"
+"""Colour maps of Matplotlib: of what has a sign, white at zero, blue below, as shortening is, and red above; and of
+what has none."""
+
+STRAIN_LIMIT = 30.0
+"""Strain at the ends of the scale over images, %."""
+
+MOTION, TRACKED, FLOW, BORDER = "#ffb000", "#35d0ff", "#7dff6a", "#ff7ab6"
+"""Colours over images: of true paths, tracked paths, flow from frame to frame, and the true border of the wall."""
+
+SERIES = ("#7b3fa0", "#d1477e", "#b58900", "#3aa7d9", "#7a4b2a", "#5a9e1e")
+"""Colours of trackers, in the order of their ranks, and of states of hearts: none is that of a quantity.
+Further trackers are grey."""
 
 SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
 """Colour and marker of the image sizes, the largest first."""
@@ -60,9 +145,6 @@ TISSUE_ENTRIES = {
     TissueLabel.TRICUSPID_LEAFLET: 19,
 }
 """Tissue to the entry of Matplotlib's `tab20`: blood in a full colour, its wall in a pale one."""
-
-MMHG = UNITS["mmHg"]
-"""Pa."""
 
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 """Metadata of an SVG: none, so that nothing but the figure is in it."""
@@ -175,6 +257,11 @@ def size_handles(sizes: Iterable[int]) -> list[Line2D]:
     ]
 
 
+def volume(largest: float) -> Quantity:
+    """The volume of the cavity, in µL or mL by the largest one that is shown, m^3."""
+    return Quantity("Volume", "of the cavity", "µL" if largest < MAX_VOLUME_IN_UL else "mL", INK)
+
+
 def series_colour(number: int) -> str:
     """Colour of the tracker with a place in the ranking, counted from 0."""
     return SERIES[number] if number < len(SERIES) else TARGET
@@ -186,7 +273,7 @@ def tissue_colours() -> list[str]:
 
 
 def layer_colours(layers: int) -> np.ndarray:
-    """Colours of the layers from endo- to epicardium.
+    """Colours of the layers, or of contours, from endo- to epicardium, which are seen on black and on white.
 
     Parameters
     ----------
@@ -197,7 +284,7 @@ def layer_colours(layers: int) -> np.ndarray:
     ndarray of shape (layers, 4)
         RGBA.
     """
-    return matplotlib.colormaps["plasma"](np.linspace(0.28, 0.86, layers))
+    return matplotlib.colormaps["plasma"](np.linspace(0.38, 0.84, layers))
 
 
 def title(view: str) -> str:

@@ -16,7 +16,9 @@ VARIABLES = {
     style.RADIAL: "radial",
     style.CIRCUMFERENTIAL: "circumferential",
     style.LONGITUDINAL: "longitudinal",
-    **{colour: f"series-{k}" for k, colour in enumerate(style.SERIES) if colour not in (style.CIRCUMFERENTIAL,)},
+    style.QUANTITIES["base"].colour: "base",
+    style.QUANTITIES["apex"].colour: "apex",
+    **{colour: f"series-{k}" for k, colour in enumerate(style.SERIES)},
     **{colour: f"size-{k}" for k, (colour, _) in enumerate(style.SIZES)},
 }
 """Colour of a figure -> variable of the page's style sheet that replaces it."""

@@ -6,6 +6,7 @@ from urllib.parse import urlencode
 
 from bokeh.models import AutocompleteInput, InputWidget, Select
 
+from echotruth.repository.choice import main_view
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS
 from echotruth.viewer.curves import CONTOURS, LINE, MEASURES, MIDDLE, WALL
@@ -63,7 +64,7 @@ def first(repository: Repository) -> Choice:
     """What is shown at first: the first case that is complete, or the first of all."""
     cases = repository.present
     case = next((case for case in cases if repository.verdict(case).status == "complete"), cases[0])
-    return Choice(case, repository.views[0], repository.sizes[0], repository.trackers[-1])
+    return Choice(case, main_view(repository.config), repository.sizes[0], repository.trackers[-1])
 
 
 def asked(repository: Repository, query: Mapping[str, Sequence[str]]) -> tuple[Choice, str]:

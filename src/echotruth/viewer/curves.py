@@ -7,6 +7,7 @@ import xarray as xr
 
 from echotruth.arrays import Floats
 from echotruth.evaluation.no_estimate import reason
+from echotruth.report import style
 from echotruth.viewer.clip import Clip
 
 LINE = "line"
@@ -16,8 +17,6 @@ WALL, MIDDLE = "wall", "middle"
 CONTOURS = ("endocardial", MIDDLE, "epicardial")
 TRUE = "true"
 """Name of the true curve."""
-MAX_VOLUME_IN_UL = 2e-6
-"""Largest volume that is shown in µL, m³; larger ones are in mL."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,8 @@ def strain(clip: Clip, found: dict[str, xr.Dataset], component: str, measure: st
     )
     chosen = {dim: part if component == LINE else int(number or 0), "measure": measure, "wall_component": component}
     shear = component == "RT" and measure == "engineering"
-    factor, unit = (np.degrees(1), "°") if shear else (100, "%")
-    return Plot(f"{strain_name(clip, component)} ({unit})", _tracked_and_true(found, name, factor, chosen))
+    unit = "°" if shear else "%"
+    return Plot(f"{strain_name(clip, component)} ({unit})", _tracked_and_true(found, name, style.FACTORS[unit], chosen))
 
 
 def no_estimate(clip: Clip, plot: Plot, tracker: str, failure: str) -> str:
@@ -81,17 +80,17 @@ def no_estimate(clip: Clip, plot: Plot, tracker: str, failure: str) -> str:
 def rotation(clip: Clip, found: dict[str, xr.Dataset]) -> Plot:
     """Rotation of a short axis, tracked and true; the twist of the heart in a long axis; degrees."""
     if clip.is_short_axis and found:
-        return Plot("rotation in this view (°)", _tracked_and_true(found, "rotation", np.degrees(1), {}))
+        return Plot("rotation in this view (°)", _tracked_and_true(found, "rotation", style.FACTORS["°"], {}))
     heart = clip.of_heart("physiology", "rotation_base", "rotation_apex", "twist")
-    shown = {name.removeprefix("rotation_"): np.degrees(values) for name, values in heart.items()}
-    return Plot("rotation of the heart (°)", shown)
+    shown = {name.removeprefix("rotation_"): style.FACTORS["°"] * values for name, values in heart.items()}
+    return Plot("rotation, base and apex, and twist (°)", shown)
 
 
 def volume(clip: Clip) -> Plot:
     """Volume of the cavity, µL or mL."""
     values = clip.of_heart("mechanics", "volume").get("volume", np.full(clip.frames, np.nan))
-    factor, unit = (1e9, "µL") if np.nanmax(values, initial=0.0) < MAX_VOLUME_IN_UL else (1e6, "mL")
-    return Plot(f"volume of the cavity ({unit})", {TRUE: factor * values})
+    quantity = style.volume(float(np.nanmax(values, initial=0.0)))
+    return Plot(quantity.plain, {TRUE: quantity.factor * values})
 
 
 def parts(clip: Clip, component: str, segments: list[int]) -> list[str]:
@@ -104,9 +103,9 @@ def parts(clip: Clip, component: str, segments: list[int]) -> list[str]:
 
 def strain_name(clip: Clip, component: str) -> str:
     """A strain in words, as echocardiography has it."""
-    direction = "circumferential" if clip.is_short_axis else "longitudinal"
-    short = "GCS" if clip.is_short_axis else "GLS"
-    names = {LINE: f"{short}, strain of a contour", "RR": "radial strain", "TT": f"{direction} strain"}
+    plane = "short_axis" if clip.is_short_axis else "long_axis"
+    direction = style.QUANTITIES[style.ALONG[plane]].words.lower()
+    names = {LINE: f"{style.GLOBAL[plane]}, strain of a contour", "RR": "radial strain", "TT": direction}
     return (names | {"RT": "shear"})[component]
 
 

@@ -5,11 +5,11 @@ from bokeh.models import BasicTicker, ColumnDataSource, Legend, LegendItem, Rang
 from bokeh.plotting import figure
 
 from echotruth.arrays import Floats
+from echotruth.report import style
 from echotruth.viewer.curves import TRUE, Plot
 
-COLOURS = ("#111111", "#1f77b4", "#d55e00", "#009e73")
+_COLUMNS = tuple(f"y{number}" for number in range(4))
 """Of the true curve, and of those of trackers."""
-_COLUMNS = tuple(f"y{number}" for number in range(len(COLOURS)))
 HEIGHT = 180
 """Of a graph on the screen until the window's is known, px."""
 
@@ -44,8 +44,7 @@ class Graph:
         self.figure.add_layout(self.cursor)
         self.figure.add_layout(self._es)
         self._lines = [
-            self.figure.line("time", name, source=self.source, line_color=colour, line_width=2, visible=False)
-            for name, colour in zip(_COLUMNS, COLOURS, strict=True)
+            self.figure.line("time", name, source=self.source, line_width=2, visible=False) for name in _COLUMNS
         ]
         self._names: list[str] = []
         self._legend = Legend(items=[], orientation="horizontal", location="top_left", spacing=12, padding=2, margin=2)
@@ -71,6 +70,7 @@ class Graph:
         self._fit(time, list(curves.values()))
         for number, line in enumerate(self._lines):
             line.visible = number < len(names)
+            line.glyph.line_color = _colour(names, number)
         if names != self._names:  # other models make Bokeh look through the whole page
             self._names = names
             self._legend.items = [LegendItem(label=name, renderers=[self._lines[n]]) for n, name in enumerate(names)]
@@ -86,3 +86,11 @@ class Graph:
         margin = 0.06 * (high - low) or 1.0
         self.figure.y_range.update(start=low - margin, end=high + margin)
         self.figure.x_range.update(start=float(time[0]), end=float(time[-1]) if len(time) > 1 else float(time[0]) + 1)
+
+
+def _colour(names: list[str], number: int) -> str:
+    """Colour of a curve: that of the quantity if it is one, of the truth, or of the tracker by its place."""
+    name = names[number] if number < len(names) else TRUE
+    if name in style.QUANTITIES:
+        return style.QUANTITIES[name].colour
+    return style.TRUTH if name == TRUE else style.series_colour(number - (TRUE in names))

@@ -77,7 +77,7 @@ class Page:
         self.arrows = CheckboxButtonGroup(labels=labels, active=[0, 1], name="arrows")
         self.arrows.on_change("active", lambda _attribute, _old, _active: self.show())
         self.play = Toggle(label="▶ Play", width=90, name="play", button_type="primary")
-        self.rate = Select(title="", value="20", options=[(rate, f"{rate} frames/s") for rate in RATES], width=105)
+        self.rate = Select(title="", value="20", options=[(rate, f"{rate} frames/s") for rate in RATES], width=125)
         self.message = Div(name="message", visible=False, styles={"color": "#a33", "font-weight": "bold"})
         self.facts = Div(name="facts", sizing_mode="stretch_width")
 

@@ -6,14 +6,14 @@ from bokeh.events import MouseMove
 from bokeh.plotting import figure
 from matplotlib.ticker import MaxNLocator
 
-from echotruth.report.clip import MOTION
+from echotruth.report import style
 from echotruth.viewer import script
 from echotruth.viewer.arrows import Arrows
 from echotruth.viewer.tint import Tint
 
 SIDE = 520
 """Of a picture on the screen until the window's width is known, px."""
-ARROWS = {"true": MOTION, "tracked": "#35d0ff", "flow": "#7dff6a"}
+ARROWS = {"true": style.MOTION, "tracked": style.TRACKED, "flow": style.FLOW}
 """Kind of paths or arrows to their colour."""
 PATHS = ("true", "tracked")
 """Those of them that are paths."""
@@ -124,7 +124,7 @@ class Panel:
         self.palette.data = dict(zip(("red", "green", "blue"), rgb.astype(np.float32).T.copy(), strict=True))
         self.names.data = {"name": ["", *tint.names.values()]}
         self.bar.color_mapper.update(palette=tint.palette, low=tint.low, high=tint.high)
-        self.bar.ticker.ticks = list(tint.names) or MaxNLocator(6).tick_values(tint.low, tint.high)
+        self.bar.ticker.ticks = list(tint.names) or MaxNLocator(6, steps=(1, 2, 5, 10)).tick_values(tint.low, tint.high)
         self.bar.update(title=tint.title, visible=True, major_label_overrides=tint.names)
         self.colour.data = {"index": [tint.index]}
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from echotruth.aha import SEGMENT_NAMES
 from echotruth.imaging.labels import TissueLabel
+from echotruth.report import style
 from echotruth.report.style import layer_colours, tissue_colours
 from echotruth.viewer.clip import Clip
 from echotruth.viewer.points import Points
@@ -38,8 +39,6 @@ LABELLED = ("layer", "segment", "region", "tissue")
 """Colours of what has a number and a name."""
 ENTRIES = 255
 """Of a palette: entry 0 of an image of indices is transparent."""
-DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
-"""Colour maps of Matplotlib: of what has a sign, with zero in the middle, and of what has none."""
 DISEASE = {1: ("infarct", "#d55e00"), 2: ("border zone", "#f0e442"), 3: ("late activation", "#56b4e9")}
 """Region to its name and its colour, of Okabe & Ito's palette for all kinds of colour vision
 (doi:10.1038/nmeth.1618)."""
@@ -95,9 +94,9 @@ def tint(clip: Clip, points: Points, colour: str, component: str, tracker: str |
     if colour == "strain":
         values = 100 * clip.strain(component)
         limit = nice(largest(values[:, ::7, ::7]))
-        return _scaled(values, -limit, limit, DIVERGING, f"{component_name(component, clip)} (%)".capitalize())
+        return _scaled(values, -limit, limit, style.SIGNED, component_quantity(component, clip).plain)
     if colour == "wall_depth":
-        return _scaled(clip.wall_depth(), 0, 1, SEQUENTIAL, "Wall depth, 0 at the endocardium")
+        return _scaled(clip.wall_depth(), 0, 1, style.UNSIGNED, "Wall depth, 0 at the endocardium")
     return _speed(clip)
 
 
@@ -108,12 +107,15 @@ def components(colour: str) -> tuple[str, ...]:
     return ("RR", "CC", "LL", "RC", "RL", "CL") if colour == "strain" else ()
 
 
+def component_quantity(component: str, clip: Clip) -> style.Quantity:
+    """A component of strain as a quantity; TT and RT depend on the view."""
+    return style.QUANTITIES[component.replace("T", "C" if clip.is_short_axis else "L")]
+
+
 def component_name(component: str, clip: Clip) -> str:
-    """A component of strain in words, as "circumferential strain"; TT and RT depend on the view."""
-    tangential = "circumferential" if clip.is_short_axis else "longitudinal"
-    names = {"R": "radial", "C": "circumferential", "L": "longitudinal", "T": tangential}
-    first, second = (names[letter] for letter in component)
-    return f"{first} strain" if first == second else f"{first}-{second} shear"
+    """A component of strain in words and as a symbol, as "circumferential strain E_CC"."""
+    quantity = component_quantity(component, clip)
+    return f"{quantity.words.lower()} {quantity.symbol}"
 
 
 def _of_points(points: Points, colour: str, component: str, tracker: str | None) -> Tint | None:
@@ -126,7 +128,7 @@ def _of_points(points: Points, colour: str, component: str, tracker: str | None)
         factor, unit = (1e6, "µm") if points.clip.side < 0.03 else (1e3, "mm")
         # One scale for all trackers of a clip: up to a quarter of its largest motion.
         limit = nice(factor * largest(np.linalg.norm(true, axis=-1), 100) / 4)
-        return _scaled(_at_pixels(points, factor * error), 0, limit, SEQUENTIAL, f"Error of displacement ({unit})")
+        return _scaled(_at_pixels(points, factor * error), 0, limit, style.UNSIGNED, f"Error of displacement ({unit})")
     number, name = WALL_COMPONENTS.index(component), component_name(component, points.clip)
     shown = true = 100 * points.true_strain()[..., number]
     limit, title = nice(largest(true)), f"True {name} (%)"
@@ -134,7 +136,7 @@ def _of_points(points: Points, colour: str, component: str, tracker: str | None)
         shown, title = 100 * points.tracked_strain(tracker)[..., number], f"Tracked {name} (%)"
     if colour == "strain_error":
         shown, title = shown - true, f"Error of {name} (% points)"
-    return _scaled(_at_pixels(points, shown), -limit, limit, DIVERGING, title)
+    return _scaled(_at_pixels(points, shown), -limit, limit, style.SIGNED, title)
 
 
 def _at_pixels(points: Points, values: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -178,7 +180,7 @@ def _speed(clip: Clip) -> Tint:
     frame_time = float(clip.time[1] - clip.time[0]) if clip.frames > 1 else 1.0
     speed = 1e3 * np.hypot(flow[..., 0], flow[..., 1]) / frame_time
     limit = nice(largest(speed[:, ::7, ::7]))
-    return _scaled(speed, 0, limit, SEQUENTIAL, "Speed in the plane (mm/s)")
+    return _scaled(speed, 0, limit, style.UNSIGNED, "Speed in the plane (mm/s)")
 
 
 def _scaled(values: NDArray[np.floating], low: float, high: float, colours: str, title: str) -> Tint:

@@ -9,12 +9,8 @@ from matplotlib.colors import to_rgb, to_rgba_array
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.report.clip import MOTION
-from echotruth.report.style import tissue_colours
+from echotruth.report.style import BORDER, MOTION, tissue_colours
 from echotruth.sharing.export.clip import Clip
-
-WALL = "#4cc9f0"
-"""Colour of the border of the wall."""
 
 OPACITY = 0.35
 """Of the colours of segments and tissues."""
@@ -79,7 +75,7 @@ def _wall(clip: Clip, frames: Pictures) -> None:
     """Draw the border of the wall, half-way between the centres of pixels in and out of it."""
     for frame, mask in zip(frames, clip.truth("mask")["mask"].values, strict=True):
         contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(frame, contours, -1, _rgb(WALL), _thickness(clip), cv2.LINE_AA)
+        cv2.drawContours(frame, contours, -1, _rgb(BORDER), _thickness(clip), cv2.LINE_AA)
 
 
 def _displacement(clip: Clip, frames: Pictures) -> None:
