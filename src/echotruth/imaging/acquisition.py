@@ -103,7 +103,8 @@ class Acquisition:
 def _screen(config: Config, frequency: np.ndarray, random: Random) -> tuple[np.ndarray, np.ndarray]:
     """Factors of a record on receive, (bins, elements, 1), and on transmit, (bins, 1, elements).
 
-    The frequencies (bins,) are in Hz. A harmonic comes from a wave of half the frequency, of which the beam is squared after the screen.
+    The frequencies (bins,) are in Hz. A harmonic comes from a wave of half the frequency, whose beam is squared after
+    the screen.
     """
     delay = delays(config.realism.aberration, config.probe, random("aberration"))
     received = phasors(delay, frequency)
