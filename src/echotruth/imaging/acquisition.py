@@ -3,7 +3,7 @@
 Applied to the full matrix, so that every synthesised transmit contains them.
 """
 
-from math import sqrt
+from math import prod, sqrt
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.rf.aberration import delays, phasors
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
+
+BYTE_STD = sqrt((256**2 - 1) / 12)
+"""Standard deviation of a random byte."""
 
 
 class Acquisition:
@@ -86,12 +89,15 @@ class Acquisition:
     def unit_noise(self, frame: int | str) -> np.ndarray:
         """Noise of variance 1 in the records of all pairs in a frame, at the frequencies of the matrix.
 
-        White over the pairs and over the band of the pulse, to which a receiver is tuned; none outside the band.
+        White over the pairs and over the band of the pulse, to which a receiver is tuned; none outside the band. Every
+        part is a random byte, since sums of many, of which channels and lines consist, are normally distributed.
         """
         matrix = self._scanner.matrix
         shape = (len(matrix.frequency), len(matrix.centres), len(matrix.centres), 2)
-        parts = self._random(f"noise {frame}").standard_normal(shape, dtype=np.float32)
-        return parts.view(np.complex64)[..., 0] / np.float32(sqrt(2))
+        parts = np.frombuffer(self._random(f"noise {frame}").bytes(prod(shape)), np.int8)
+        # Bytes are from -128 to 127, of which the mean is -1/2.
+        scaled = (parts + np.float32(0.5)) * np.float32(1 / BYTE_STD / sqrt(2))
+        return scaled.view(np.complex64).reshape(shape[:3])
 
     def _signal_to_unit_noise(self) -> float:
         """RMS of the echo of muscle over that of unit noise, in the lines where muscle is at end-diastole."""
@@ -108,8 +114,8 @@ class Acquisition:
 def _screen(config: Config, frequency: np.ndarray, random: Random) -> tuple[np.ndarray, np.ndarray]:
     """Factors of a record on receive, (bins, elements, 1), and on transmit, (bins, 1, elements).
 
-    The frequencies (bins,) are in Hz. A harmonic comes from a wave of half the frequency, of which the beam is squared
-    after the screen.
+    The frequencies (bins,) are in Hz. A harmonic comes from a wave of half the frequency, whose beam is squared after
+    the screen.
     """
     delay = delays(config.realism.aberration, config.probe, random("aberration"))
     received = phasors(delay, frequency)

@@ -66,7 +66,7 @@ class Aperture:
         return self._window(line_origin, range_, self.tapered)
 
     def sent_weights(self, line_origin: np.ndarray, range_: float) -> np.ndarray:
-        """Weights on transmit of beams that are focused there, as :meth:`weights`; if used, of their harmonic."""
+        """Weights on transmit of beams that are focused there, as :meth:`weights`, or of their harmonic."""
         weights = self._window(line_origin, range_, self._sends_tapered)
         return harmonic(weights) if self._harmonic else weights
 

@@ -298,8 +298,8 @@ class FullMatrix:
         for start in range(0, len(traces), 64):
             some = traces[start : start + 64]
             for fading, response in zip(damping, responses, strict=True):
-                spectra = fft.rfft(some * fading, axis=1, workers=threads)[:, band] * response
-                total[:, start : start + 64] += spectra.T
+                faded = some if (fading == 1).all() else some * fading
+                total[:, start : start + 64] += (fft.rfft(faded, axis=1, workers=threads)[:, band] * response).T
         return total
 
 
