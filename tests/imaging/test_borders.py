@@ -70,7 +70,7 @@ def tilted(sheet, degrees):
 
 def test_flat_border_across_the_beam_has_its_level_and_a_tilted_one_has_not(level):
     probe, random = CONFIG.probe.si(), np.random.default_rng(5)
-    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 * 4 * HALF[0] * HALF[2])
+    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 / 2 * 4 * HALF[0] * HALF[2])
     sheet, amplitude = random.uniform(-1, 1, (count, 2)) * HALF[[0, 2]], np.full(count, border_amplitude(CONFIG, 10.0))
     across, oblique = (level(tilted(sheet, tilt), amplitude) for tilt in (0.0, 25.0))
     assert across == pytest.approx(10, abs=3)

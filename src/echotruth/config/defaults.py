@@ -94,10 +94,10 @@ REALISM_IMAGE: dict[str, Any] = {
     "bmode.dynamic_range_dB": 50.0,
     "bmode.grey_gamma": 1.3,
     "bmode.smoothing": 0.65,
-    "bmode.dropout.edge_loss_dB": 16.0,
+    "bmode.dropout.edge_loss_dB": 17.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_GAIN_DB = {"mouse": -10.0, "human": -8.5}
+REALISM_GAIN_DB = {"mouse": -11.0, "human": -7.5}
 """`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
@@ -106,8 +106,8 @@ REALISM_SCAN: dict[str, dict[str, float]] = {
 """`realism.preset` -> dotted keys whose defaults are so many times those of the array, so that the roof of the atria is
 seen."""
 REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
-    "mouse": {0.1: 8, 0.17: 5, 0.23: 3, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
-    "human": {0.1: 19, 0.17: 13, 0.23: 5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
+    "mouse": {0.1: 7, 0.17: 4, 0.23: 2, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
+    "human": {0.1: 19.5, 0.17: 13.5, 0.23: 5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
 }
 """`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: with it, an even
 medium is as bright at any range of the default array."""

@@ -25,7 +25,6 @@ from echotruth.imaging.medium.aortic_root import valve_ring
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
 from echotruth.imaging.medium.filling import aortic_opening, course
-from echotruth.imaging.medium.mitral_valve import DENSITY
 from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
 MEETING = (0.97, 0.75)
@@ -122,10 +121,10 @@ class AorticCusps(CavityBody):
     def seed(cls, scene: Scene) -> Self:
         """Draw scatterers over the cusps, as dense as in mitral leaflets, with amplitudes of a border of the level."""
         random, radius = scene.random(cls.name), AorticValve(scene.heart).ring(0).radius
-        number = random.poisson(DENSITY * border_density(scene.config) * 2 * pi * _length() * radius**2)
+        number = random.poisson(border_density(scene.config) * 2 * pi * _length() * radius**2)
         azimuth, share = random.uniform(0, 2 * pi, number), random.random(number)
         place = np.column_stack([azimuth, share])[random.random(number) > NARROWING * share]
-        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config), DENSITY)
+        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config))
         return cls(scene, place, np.full(len(place), amplitude))
 
     def in_heart(self, frame: int) -> Floats:

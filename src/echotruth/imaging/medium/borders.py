@@ -2,9 +2,9 @@
 
 A sheet of N scatterers of equal amplitude within a beam returns N^2 times the power of one where it is perpendicular
 to the beam, and N times elsewhere, as their echoes are in phase or not: a line that is bright where the border faces
-the probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per square of
-the wavelength, N is some 16 in the default mouse. They are carried by the surface; their amplitude grows with its area,
-so that the echo of a border is that of its area.
+the probe and fainter at the sides, as that of a real border, which is a rough mirror. With one scatterer per two
+squares of the wavelength, N is some 8 in the default mouse. They are carried by the surface; their amplitude grows with
+its area, so that the echo of a border is that of its area.
 """
 
 from dataclasses import dataclass
@@ -83,7 +83,7 @@ class Epicardium(Border):
     name, level, surface = "epicardium", "borders.epicardium_dB", "epi"
 
 
-def border_amplitude(config: Config, level_dB: float, density: float = 1.0) -> float:
+def border_amplitude(config: Config, level_dB: float) -> float:
     """Amplitude of the scatterers of a border, relative to the standard deviation of those of muscle.
 
     With Gaussian beam and pulse of standard deviations s_x, s_y and s_z at the focus, muscle of density rho returns the
@@ -94,8 +94,6 @@ def border_amplitude(config: Config, level_dB: float, density: float = 1.0) -> f
     config : Config
     level_dB : float
         Echo power of a flat border across the beam at its focus over that of muscle.
-    density : float
-        Of the scatterers, over :func:`border_density`.
     """
     probe, focus = config.probe.si(), config.rf.si().focus
     wavelength = probe.sound_speed / probe.frequency
@@ -103,13 +101,13 @@ def border_amplitude(config: Config, level_dB: float, density: float = 1.0) -> f
     elevation = BEAM_STD * wavelength * focus / probe.height
     axial = PULSE_STD * probe.sound_speed / 2 / (probe.bandwidth * probe.frequency)
     power = config.phantom.si().density * sqrt(pi) * axial / (4 * pi * lateral * elevation)
-    return 10 ** (level_dB / 20) * sqrt(power) / (density * border_density(config))
+    return 10 ** (level_dB / 20) * sqrt(power) / border_density(config)
 
 
 def border_density(config: Config) -> float:
-    """Scatterers of a border per area, 1/m^2: one per square of the wavelength."""
+    """Scatterers of a border per area, 1/m^2: one per two squares of the wavelength."""
     probe = config.probe.si()
-    return (probe.frequency / probe.sound_speed) ** 2
+    return (probe.frequency / probe.sound_speed) ** 2 / 2
 
 
 def _area(nodes: Floats, facets: Integers, xi: Floats) -> Floats:

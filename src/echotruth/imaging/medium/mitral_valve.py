@@ -41,8 +41,6 @@ TURN = {1: radians(25), -1: radians(45)}
 """How far the anterior, 1, and the posterior leaflet, -1, turn from annulus to edge when shut, rad."""
 OPEN = {1: (radians(105), radians(80)), -1: (radians(95), radians(85))}
 """Angles below the annulus of their base and edge when open, rad."""
-DENSITY = 0.5
-"""Scatterers in an area of a leaflet over those on a border, of which a frame costs less."""
 THICKNESS = 0.08
 """Mean thickness over the radius of the rim: 2 mm in the human preset."""
 WAVES = (((9.0, 2.0), 0.5, 0.012), ((3.0, 7.0), 2.0, 0.015), ((14.0, -8.0), 4.0, 0.006))
@@ -179,7 +177,7 @@ class Leaflets(CavityBody):
         """
         radius, random = Rim(scene.heart)(0).radius, scene.random
         level = cls.level_dB(scene.config)
-        amplitude = border_amplitude(scene.config, level, DENSITY)
+        amplitude = border_amplitude(scene.config, level)
         parts = [_drawn_leaflet(scene, side, radius, amplitude) for side in LEAFLETS]
         density = scene.config.phantom.si().density
         parts.append(_drawn_annulus(random("annulus"), density * radius**3, 10 ** ((level + ANNULUS_DB) / 20)))
@@ -268,7 +266,7 @@ Drawn = tuple[NDArray[np.int8], Floats, Floats]
 def _drawn_leaflet(scene: Scene, side: Part, radius: float, amplitude: float) -> Drawn:
     """Scatterers of a leaflet at a rim of a radius, m, with a mean amplitude."""
     random = scene.random(f"{Leaflets.name} {side.name.lower()}")
-    number = random.poisson(DENSITY * border_density(scene.config) * 4 * _length(side) * radius**2)
+    number = random.poisson(border_density(scene.config) * 4 * _length(side) * radius**2)
     commissural, share = random.uniform(-1, 1, number), random.random(number)
     kept = (2 * random.random(number) < span(commissural)) & (share < edge(commissural))
     commissural, share = commissural[kept], share[kept]

@@ -25,7 +25,6 @@ from echotruth.imaging.medium.annulus import Ring
 from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
 from echotruth.imaging.medium.filling import course, opening
-from echotruth.imaging.medium.mitral_valve import DENSITY
 from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
 APICAL = 0.15
@@ -126,11 +125,11 @@ class TricuspidLeaflets(CavityBody):
     def seed(cls, scene: Scene) -> Self:
         """Draw scatterers over the leaflets, as dense as in mitral ones, with amplitudes of a border of the level."""
         random, radius = scene.random(cls.name), TricuspidValve(scene.heart).ring(0).radius
-        number = random.poisson(DENSITY * border_density(scene.config) * 8 * _length() * radius**2)
+        number = random.poisson(border_density(scene.config) * 8 * _length() * radius**2)
         side, across = np.where(random.random(number) < 0.5, -1.0, 1.0), random.uniform(-1, 1, number)
         place = np.column_stack([side, across, random.random(number)])
         place = place[random.random(number) < np.sqrt(1 - across**2)]
-        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config), DENSITY)
+        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config))
         return cls(scene, place, np.full(len(place), amplitude))
 
     def in_heart(self, frame: int) -> Floats:
