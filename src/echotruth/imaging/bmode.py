@@ -8,7 +8,6 @@ images comes last, before they are rounded to eight bits: persistence, smoothing
 import numpy as np
 
 from echotruth.config import Bmode, Probe
-from echotruth.imaging import spline
 from echotruth.imaging.beamforming.scan import Scan
 
 DROPOUT_WAVES = 64
@@ -119,6 +118,8 @@ class ScanConversion:
     def __call__(self, envelopes: np.ndarray) -> np.ndarray:
         """Image (axial, lateral) of the envelopes (lines, ranges), float32; 0 outside the scan, never negative."""
         image, values = np.zeros(self._shape, np.float32), np.empty(len(self._inside), np.float32)
+        from echotruth.imaging import spline  # compiled; whoever reads a clip needs but the centres of its pixels
+
         padded = spline.coefficients(np.ascontiguousarray(envelopes, np.float32))
         spline.evaluate(padded, self._line, self._sample, values)
         # The spline may undershoot beside an edge; an envelope is not negative.

@@ -9,13 +9,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from echotruth.imaging.labels import TissueLabel
 from echotruth.section import UNITS
 
 RADIAL, CIRCUMFERENTIAL, LONGITUDINAL = "#b5382a", "#1f5fa8", "#2f8550"
@@ -41,21 +39,6 @@ SERIES = ("#1f5fa8", "#c8641b", "#2f8550", "#8a4f9e", "#2f9aa0", "#a87f13")
 
 SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
 """Colour and marker of the image sizes, the largest first."""
-
-TISSUE_ENTRIES = {
-    TissueLabel.CAVITY: 6,
-    TissueLabel.WALL: 2,
-    TissueLabel.LEFT_ATRIUM: 8,
-    TissueLabel.RIGHT_VENTRICLE: 0,
-    TissueLabel.RIGHT_ATRIUM: 4,
-    TissueLabel.RIGHT_FREE_WALL: 1,
-    TissueLabel.ATRIAL_WALL: 9,
-    TissueLabel.MITRAL_LEAFLET: 16,
-    TissueLabel.PAPILLARY_MUSCLE: 3,
-    TissueLabel.LUNG: 19,
-    TissueLabel.CHEST_WALL: 10,
-}
-"""Tissue to the entry of Matplotlib's `tab20`: blood in a full colour, its wall in a pale one."""
 
 MMHG = UNITS["mmHg"]
 """Pa."""
@@ -174,11 +157,6 @@ def size_handles(sizes: Iterable[int]) -> list[Line2D]:
 def series_colour(number: int) -> str:
     """Colour of the tracker with a place in the ranking, counted from 0."""
     return SERIES[number] if number < len(SERIES) else TARGET
-
-
-def tissue_colours() -> list[str]:
-    """Colours of the tissues of :class:`echotruth.imaging.labels.TissueLabel` from 1 on, as #rrggbb."""
-    return [to_hex(matplotlib.colormaps["tab20"](TISSUE_ENTRIES[label])) for label in TissueLabel if label]
 
 
 def layer_colours(layers: int) -> np.ndarray:

@@ -6,7 +6,7 @@ from bokeh.events import MouseMove
 from bokeh.plotting import figure
 from matplotlib.ticker import MaxNLocator
 
-from echotruth.report.clip import MOTION
+from echotruth.report.palette import MOTION
 from echotruth.viewer import script
 from echotruth.viewer.arrows import Arrows
 from echotruth.viewer.tint import Tint
