@@ -86,9 +86,18 @@ def test_command_that_needs_more_says_which_extra_in_one_line(tmp_path):
     assert (done.returncode, done.stderr.splitlines()) == (0, said)
 
 
-def test_function_that_needs_more_says_which_extra(tmp_path):
-    done = light("import echotruth as et; et.beat", tmp_path)
-    assert done.stderr.splitlines()[-1] == f"echotruth.extras.MissingPackage: echotruth.beat {WHOLE.format('numba')}"
+def test_functions_that_need_more_say_which_extra(tmp_path):
+    """One that is imported with what it needs, and one that imports it when it is called."""
+    program = """
+import echotruth as et
+for call in (lambda: et.beat(), lambda: et.sample().difficulty("infarct", "mid")):
+    try:
+        call()
+    except ImportError as error:
+        print(error)
+"""
+    said = [f"echotruth.beat {WHOLE.format('numba')}", f"difficulty {WHOLE.format('scipy')}"]
+    assert light(program, tmp_path).stdout.splitlines() == said
 
 
 def test_extra_has_the_packages_that_are_named():
