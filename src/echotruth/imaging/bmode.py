@@ -117,9 +117,9 @@ class ScanConversion:
 
     def __call__(self, envelopes: np.ndarray) -> np.ndarray:
         """Image (axial, lateral) of the envelopes (lines, ranges), float32; 0 outside the scan, never negative."""
-        image, values = np.zeros(self._shape, np.float32), np.empty(len(self._inside), np.float32)
         from echotruth.imaging import spline  # compiled; whoever reads a clip needs but the centres of its pixels
 
+        image, values = np.zeros(self._shape, np.float32), np.empty(len(self._inside), np.float32)
         padded = spline.coefficients(np.ascontiguousarray(envelopes, np.float32))
         spline.evaluate(padded, self._line, self._sample, values)
         # The spline may undershoot beside an edge; an envelope is not negative.
