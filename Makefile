@@ -81,7 +81,7 @@ sample: .venv/ready config/sample.yaml  ## the repository that comes with the pa
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate
 
-COMPILE := uv pip compile pyproject.toml --extra test --extra browser --extra build --universal --python-version 3.11 \
+COMPILE := uv pip compile pyproject.toml --extra make --extra test --extra browser --extra build --universal --python-version 3.11 \
 	--generate-hashes --no-header --no-annotate --quiet
 
 lock:  ## needs uv

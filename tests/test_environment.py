@@ -55,7 +55,7 @@ def tracked():
 
 
 def test_conda_asks_for_what_pip_asks_for():
-    expected = {CONDA_NAMES.get(each.name, each.name): str(each.specifier) for each in requirements("test")}
+    expected = {CONDA_NAMES.get(each.name, each.name): str(each.specifier) for each in requirements("make", "test")}
     assert {name: bounds for name, bounds in conda().items() if name not in CONDA_ONLY} == expected
 
 
@@ -68,7 +68,7 @@ def test_conda_has_the_same_python():
     assert set(conda()) >= CONDA_ONLY
 
 
-@pytest.mark.parametrize("requirement", requirements("test", "build"), ids=lambda each: each.name)
+@pytest.mark.parametrize("requirement", requirements("make", "test", "build"), ids=lambda each: each.name)
 def test_lock_pins_and_hashes_a_version_within_bounds(requirement):
     versions = lock()[requirement.name]
     assert versions and all(requirement.specifier.contains(version) for version in versions)

@@ -12,9 +12,18 @@ A heart of one's own, and its clip, take a minute each:
 >>> clip = et.image(heart, "mid")  # doctest: +SKIP
 """
 
+from typing import Any
+
 import lazy_loader
+
+from echotruth.extras import explained
 
 __version__ = "0.2.0"
 
 # Modules are imported when one of their names is first used; __init__.pyi lists them.
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+_imported, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+
+
+def __getattr__(name: str) -> Any:
+    with explained(f"echotruth.{name}"):
+        return _imported(name)

@@ -18,7 +18,8 @@ from .notebook.datasets import heart_dataset
 from .notebook.kinematics import kinematics
 from .notebook.point_tracks import point_tracks
 from .notebook.sensitivities import sensitivities
-from .notebook.simulation import beat, evaluate, image, systole, track
+from .notebook.simulation import beat, image, systole
+from .notebook.tracking import evaluate, track
 from .notebook.velocity import velocity
 from .repository.reader import Repository, sample
 from .sharing.fetching import fetch

@@ -6,6 +6,7 @@ from importlib import import_module
 
 import echotruth
 from echotruth.cli.command import Parser, add_command, did_you_mean, fail
+from echotruth.extras import MissingPackage, explained
 
 COMMANDS = (
     *("new", "check", "cases", "run", "status", "info", "show"),
@@ -28,7 +29,8 @@ def main() -> None:
         sys.exit(fail(_unknown(options[0], arguments.command, whole)))
     arguments.options = options
     try:
-        ended = arguments.act(arguments)
+        with explained(arguments.command):
+            ended = arguments.act(arguments)
         sys.stdout.flush()
     except KeyboardInterrupt:
         sys.exit(fail("interrupted") and 130)
@@ -36,6 +38,8 @@ def main() -> None:
         # Whoever read the output has seen enough; the interpreter would tell so at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    except MissingPackage as error:
+        sys.exit(fail(str(error)))
     except OSError as error:
         place = f"{error.filename!s:.200}: " if error.filename else ""
         sys.exit(fail(f"{place}{error.strerror or error}: see that the path is right and you may read and write there"))

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.spatial import cKDTree
+
+from echotruth.evaluation.neighbours import within
 
 MIN_POINTS = 10
 """Smallest number of points of a fit, which has six coefficients."""
@@ -67,37 +67,32 @@ class LocalFit:
         for number, pattern in enumerate(patterns):
             frames = np.flatnonzero(pattern_of_frame.ravel() == number)
             columns = np.moveaxis(filled[frames], 1, 0).reshape(len(pattern), 2 * len(frames))
-            fitted = (self._matrix(pattern) @ columns).reshape(targets, 3, len(frames), 2)
-            result[frames] = fitted.transpose(2, 0, 1, 3)
+            fitted = np.zeros((targets, 3, 2 * len(frames)))
+            # Neighbour by neighbour, so that the sums of a frame do not depend on the others.
+            for coefficients, neighbour in zip(self._known_coefficients(pattern), self._neighbours[0].T, strict=True):
+                fitted += coefficients[..., None] * columns[neighbour, None]
+            result[frames] = fitted.reshape(targets, 3, len(frames), 2).transpose(2, 0, 1, 3)
         return result
 
     @cached_property
     def _neighbours(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Indices of the neighbours of every target, their weights w and their polynomial terms p."""
-        tree = cKDTree(self.position)
-        most = int(np.max(tree.query_ball_point(self.target, self.radius, return_length=True), initial=1))
-        distance, neighbour = tree.query(self.target, most, distance_upper_bound=self.radius)
-        distance, neighbour = (array.reshape(len(self.target), most) for array in (distance, neighbour))
-        # Where a target has fewer neighbours, the tree pads with an infinite distance and an index out of range.
-        neighbour = np.where(np.isfinite(distance), neighbour, 0)
+        neighbour, distance = within(self.position, self.target, self.radius)
         # Points across a narrow cavity, whose radial direction is opposite, do not count.
         same_side = np.einsum("nkj,nj->nk", self.normal[neighbour], self.target_normal) > 0
         weight = np.where(np.isfinite(distance) & same_side, 1 - (distance / self.radius) ** 2, 0)
         x, y = np.moveaxis((self.position[neighbour] - self.target[:, None]) / self.radius, -1, 0)
         return neighbour, weight, np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
 
-    def _matrix(self, known: np.ndarray) -> csr_array:
-        """Matrix from the values at the points to value (1), d/dx and d/dy (1/m) at the targets, (3 target, point)."""
+    def _known_coefficients(self, known: np.ndarray) -> np.ndarray:
+        """Coefficients from the values at the neighbours to value (1), d/dx and d/dy (1/m), (neighbour, target, 3)."""
         neighbour, weight, _ = self._neighbours
         incomplete = ((weight > 0) & ~known[neighbour]).any(1)
         coefficients = self._coefficients_of_all
         if incomplete.any():
             coefficients = coefficients.copy()
             coefficients[incomplete] = self._coefficients(incomplete, known)
-        targets, most = neighbour.shape
-        values = np.swapaxes(coefficients, 1, 2).ravel()
-        columns, rows = np.repeat(neighbour, 3, axis=0).ravel(), np.arange(3 * targets + 1) * most
-        return csr_array((values, columns, rows), (3 * targets, len(self.position)))
+        return np.swapaxes(coefficients, 0, 1)
 
     @cached_property
     def _coefficients_of_all(self) -> np.ndarray:

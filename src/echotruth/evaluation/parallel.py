@@ -52,6 +52,5 @@ def in_processes(
 
 
 def _limit_threads(threads: int) -> None:
-    import numba
-
-    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]  # set at run time
+    """Limit the threads of Numba, which asks for them when a tracker imports it."""
+    os.environ["NUMBA_NUM_THREADS"] = str(min(threads, int(os.environ.get("NUMBA_NUM_THREADS", threads))))

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from echotruth.evaluation.local_fit import LocalFit
+from echotruth.evaluation.neighbours import nearest
 from echotruth.evaluation.statistics import ratio
 from echotruth.mechanics.kinematics import IMAGE_COMPONENTS, strain
 
@@ -80,7 +80,7 @@ class StrainOperator:
         """The fit of the displacement at other points of the wall, (target, 2), m."""
         normal = np.zeros(target.shape)
         if len(self.position):
-            normal = self.axes[cKDTree(self.position).query(target)[1], 0]
+            normal = self.axes[nearest(self.position, target), 0]
         return LocalFit(self.position, self.axes[:, 0], target, normal, self.radius)
 
     @cached_property

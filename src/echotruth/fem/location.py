@@ -6,11 +6,11 @@ reaches beyond each face of the straight tetrahedron with the same corners. That
 Newton's method on x(xi) = x tests.
 """
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.fem.kernels import kernels
 from echotruth.fem.tetrahedra import EDGES, Integers, MaterialPoints
 
 _BOXES_PER_CELL = 4
@@ -19,7 +19,7 @@ _BOXES_PER_CELL = 4
 _MAX_BOXES = 64
 """Boxes along an axis at most."""
 
-_TOLERANCE = 1e-10
+TOLERANCE = 1e-10
 """Distance by which local coordinates may leave the tetrahedron, so that round-off at a face loses no point."""
 
 _MARGIN = 1e-9
@@ -56,7 +56,7 @@ def locate(positions: Floats, cells: Integers, points: Floats) -> MaterialPoints
     near = np.flatnonzero(((low <= grid[1]) & (high >= grid[0])).all(axis=1)).astype(np.int32)
     start, candidates = _candidates(low[near], high[near], grid)
     shapes = _shapes(np.ascontiguousarray(np.swapaxes(bezier[:, near], 0, 1)))
-    cell, xi = _locate(points, grid, start, candidates, *shapes)
+    cell, xi = kernels().locate(points, grid, start, candidates, *shapes)
     return MaterialPoints(np.append(near, np.int32(-1))[cell], xi)
 
 
@@ -113,84 +113,3 @@ def _shapes(bezier: Floats) -> tuple[Floats, Floats, Floats]:
     first = bezier[:, _BEZIER_INDEX] - bezier[:, _BEZIER_INDEX[:, :1]]
     derivatives = np.concatenate([first[:, :1], first[:, 1:] - first[:, :1]], axis=1)[:, :, 1:]
     return np.concatenate([bezier[:, :1], inverse], axis=1), least, np.ascontiguousarray(2 * derivatives)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _locate(points, grid, start, candidates, straight, least, derivatives):  # pragma: no cover - compiled
-    cells, xi = np.full(len(points), -1, np.int64), np.zeros((len(points), 3))
-    local, work = np.empty(3), np.empty((4, 3))
-    for p in range(len(points)):
-        box = _box(grid, points[p])
-        for slot in range(start[box], start[box + 1]):
-            cell = candidates[slot]
-            near = _near(straight[cell], least[cell], points[p], local)
-            if near and _invert(straight[cell, 0], derivatives[cell], points[p], local, work):
-                cells[p] = cell
-                for i in range(3):
-                    xi[p, i] = local[i]
-                break
-    return cells, xi
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _box(grid, point):  # pragma: no cover - compiled
-    """Number of the box that holds a point; outside of the grid that of the box without cells."""
-    box = 0
-    for i in range(3):
-        if not grid[0, i] <= point[i] <= grid[1, i]:
-            return int(grid[3, 0] * grid[3, 1] * grid[3, 2])
-        box = box * int(grid[3, i]) + int(min((point[i] - grid[0, i]) * grid[2, i], grid[3, i] - 1))
-    return box
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _near(straight, least, point, local):  # pragma: no cover - compiled
-    """Whether a cell may hold a point; fills its local coordinates in the straight tetrahedron."""
-    first = 1.0
-    for i in range(3):
-        local[i] = 0.0
-        for j in range(3):
-            local[i] += straight[1 + i, j] * (point[j] - straight[0, j])
-        if not local[i] >= least[1 + i]:
-            return False
-        first -= local[i]
-    return first >= least[0]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _invert(corner, derivatives, point, xi, work):  # pragma: no cover - compiled
-    """Newton's method for x(xi) = point, in place: dx/dxi delta = point - x(xi); returns if xi is in the cell.
-
-    x(xi) is the corner plus sum_k xi_k (dx/dxi_k at the corner + dx/dxi_k at xi) / 2, exactly.
-    """
-    dx_dxi, residual = work[:3], work[3]
-    change = np.inf
-    for _ in range(30):
-        for i in range(3):
-            residual[i] = point[i] - corner[i]
-            for k in range(3):
-                dx_dxi[k, i] = derivatives[0, k, i]
-                for m in range(3):
-                    dx_dxi[k, i] += derivatives[1 + m, k, i] * xi[m]
-                residual[i] -= (derivatives[0, k, i] + dx_dxi[k, i]) / 2 * xi[k]
-        change = _newton_step(dx_dxi, residual, xi)
-        if change < 1e-12 or change > 10:  # the next step would be round-off, or the method diverges
-            break
-    inside = min(xi[0], xi[1], xi[2]) >= -_TOLERANCE and xi[0] + xi[1] + xi[2] <= 1 + _TOLERANCE
-    return inside and change < 1e-9
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _newton_step(dx_dxi, residual, xi):  # pragma: no cover - compiled
-    """Take a step by Cramer's rule, faster than LAPACK on three unknowns; returns the largest change."""
-    determinant, largest = _triple(dx_dxi[0], dx_dxi[1], dx_dxi[2]), 0.0
-    for k in range(3):
-        change = _triple(residual, dx_dxi[(k + 1) % 3], dx_dxi[(k + 2) % 3]) / determinant
-        xi[k] += change
-        largest = max(largest, abs(change))
-    return largest
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _triple(a, b, c):  # pragma: no cover - compiled
-    return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])

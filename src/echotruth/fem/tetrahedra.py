@@ -7,11 +7,11 @@ carry it to x(xi) = sum_a N_a(xi) x_a.
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.fem.kernels import kernels
 
 Integers = NDArray[np.int32]
 
@@ -132,7 +132,7 @@ def interpolate(values: Floats, cells: Integers, points: MaterialPoints) -> Floa
     ndarray of shape (n, ...), in the unit of `values`
     """
     columns = np.ascontiguousarray(values, float).reshape(len(values), -1)
-    return _interpolate(columns, *_contiguous(cells, points)).reshape(len(points), *values.shape[1:])
+    return kernels().interpolate(columns, *_contiguous(cells, points)).reshape(len(points), *values.shape[1:])
 
 
 def gradient(values: Floats, positions: Floats, cells: Integers, points: MaterialPoints) -> Floats:
@@ -152,7 +152,7 @@ def gradient(values: Floats, positions: Floats, cells: Integers, points: Materia
         The deformation gradient, where `values` are the nodes' deformed positions.
     """
     columns = np.ascontiguousarray(values, float).reshape(len(values), -1)
-    gradients = _gradient(columns, np.ascontiguousarray(positions, float), *_contiguous(cells, points))
+    gradients = kernels().gradient(columns, np.ascontiguousarray(positions, float), *_contiguous(cells, points))
     return gradients.reshape(len(points), *values.shape[1:], 3)
 
 
@@ -177,85 +177,6 @@ def _contiguous(cells: Integers, points: MaterialPoints) -> tuple[Integers, Inte
     """Cells, and cell and local coordinates of points, each of one type, so that kernels are compiled once."""
     cell = np.ascontiguousarray(points.cell, np.int32)
     return np.ascontiguousarray(cells, np.int32), cell, np.ascontiguousarray(points.xi, float)
-
-
-@numba.njit(cache=True)
-def _interpolate(values, cells, cell, xi):  # pragma: no cover - compiled
-    result, corner, weight = np.empty((len(cell), values.shape[1])), np.empty(4), np.empty(10)
-    for p in range(len(cell)):
-        _corners(xi[p], corner)
-        for a in range(4):
-            weight[a] = corner[a] * (2 * corner[a] - 1)
-        for e in range(6):
-            weight[4 + e] = 4 * corner[EDGES[e, 0]] * corner[EDGES[e, 1]]
-        for k in range(values.shape[1]):
-            total = 0.0
-            for a in range(10):
-                total += weight[a] * values[cells[cell[p], a], k]
-            result[p, k] = total
-    return result
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _gradient(values, positions, cells, cell, xi):  # pragma: no cover - compiled
-    result, corner, dN_dxi = np.empty((len(cell), values.shape[1], 3)), np.empty(4), np.empty((3, 10))
-    dx_dxi, inverse, dv_dxi = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    for p in range(len(cell)):
-        nodes = cells[cell[p]]
-        _corners(xi[p], corner)
-        _shape_gradient(corner, dN_dxi)
-        for i in range(3):
-            _derivative(dN_dxi, positions, nodes, i, dv_dxi)
-            for m in range(3):
-                dx_dxi[m, i] = dv_dxi[m]
-        _invert(dx_dxi, inverse)
-        for k in range(values.shape[1]):
-            _derivative(dN_dxi, values, nodes, k, dv_dxi)
-            for j in range(3):
-                result[p, k, j] = dv_dxi[0] * inverse[0, j] + dv_dxi[1] * inverse[1, j] + dv_dxi[2] * inverse[2, j]
-    return result
-
-
-@numba.njit(cache=True)
-def _corners(xi, corner):  # pragma: no cover - compiled
-    """Fill the barycentric coordinates (4,)."""
-    corner[0] = 1 - (xi[0] + xi[1] + xi[2])
-    for k in range(3):
-        corner[1 + k] = xi[k]
-
-
-@numba.njit(cache=True)
-def _shape_gradient(corner, dN_dxi):  # pragma: no cover - compiled
-    """Fill the derivatives of the shape functions by the local coordinates, (3, 10)."""
-    for m in range(3):
-        for a in range(4):
-            dN_dxi[m, a] = (4 * corner[a] - 1) * ((a == m + 1) - (a == 0))
-        for e in range(6):
-            a, b = EDGES[e, 0], EDGES[e, 1]
-            dN_dxi[m, 4 + e] = 4 * (corner[b] * ((a == m + 1) - (a == 0)) + corner[a] * ((b == m + 1) - (b == 0)))
-
-
-@numba.njit(cache=True)
-def _derivative(dN_dxi, values, nodes, column, dv_dxi):  # pragma: no cover - compiled
-    """Fill the derivatives of a column of nodal values by the local coordinates, (3,)."""
-    for m in range(3):
-        dv_dxi[m] = 0.0
-        for a in range(10):
-            dv_dxi[m] += dN_dxi[m, a] * values[nodes[a], column]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _invert(matrix, inverse):  # pragma: no cover - compiled
-    """Fill the inverse of the transpose of a matrix (3, 3), by its cofactors."""
-    for m in range(3):
-        a, b = (m + 1) % 3, (m + 2) % 3
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            inverse[m, i] = matrix[a, j] * matrix[b, k] - matrix[a, k] * matrix[b, j]
-    determinant = matrix[0, 0] * inverse[0, 0] + matrix[0, 1] * inverse[0, 1] + matrix[0, 2] * inverse[0, 2]
-    for m in range(3):
-        for i in range(3):
-            inverse[m, i] /= determinant
 
 
 def straight_triangles(facets: Integers) -> Integers:

@@ -8,7 +8,6 @@ images comes last, before they are rounded to eight bits: persistence, smoothing
 import numpy as np
 
 from echotruth.config import Bmode, Probe
-from echotruth.imaging import spline
 from echotruth.imaging.beamforming.scan import Scan
 
 DROPOUT_WAVES = 64
@@ -128,6 +127,8 @@ class ScanConversion:
 
     def interpolated(self, samples: np.ndarray) -> np.ndarray:
         """Values of samples (lines, ranges) at the pixels within the scan, in their order, float32."""
+        from echotruth.imaging import spline  # compiled; whoever reads a clip needs but the centres of its pixels
+
         values = np.empty(len(self._inside), np.float32)
         padded = spline.coefficients(np.ascontiguousarray(samples, np.float32))
         spline.evaluate(padded, self._line, self._sample, values)

@@ -3,13 +3,16 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.heart import Heart
 from echotruth.mechanics import fibres
 from echotruth.mechanics.angles import angles_from_frames
 from echotruth.mechanics.kinematics import centroid_strains
-from echotruth.mechanics.outputs import Arrays
+
+Arrays = dict[str, NDArray]
+"""Arrays by name."""
 
 
 def centroid_kinematics(heart: Heart, frames: Sequence[int] | None = None) -> Arrays:

@@ -7,11 +7,9 @@ the two rules differ.
 """
 
 import numpy as np
-from scipy.sparse import csr_matrix, triu
 
 from echotruth.config import Fibres
 from echotruth.fem.quadrature import tetrahedron
-from echotruth.fem.sparse import factorization
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics import angles, disarray
 
@@ -55,6 +53,10 @@ def wall_depth(mesh: Mesh) -> Floats:
 
 def _minimize(mesh: Mesh, k: Floats, f: Floats | None, zero: Integers, one: Integers | None = None) -> Floats:
     """Nodal values u that minimise u K u / 2 - u f and are 0 and 1 at given nodes; K, f cell by cell."""
+    from scipy.sparse import csr_matrix, triu  # whoever reads a heart needs none
+
+    from echotruth.fem.sparse import factorization
+
     n_nodes = len(mesh.nodes)
     row, column = np.repeat(mesh.cells, 10, axis=1), np.tile(mesh.cells, 10)
     matrix = csr_matrix((k.ravel(), (row.ravel(), column.ravel())), (n_nodes, n_nodes))

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.mechanics.fibres import CENTROID, axes_from_normal, material_gradients, unit
-from echotruth.mechanics.solver import element
 
 RCL_COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 """Components RR, CC, LL, RC, RL, CL."""
@@ -111,6 +110,8 @@ def wall_strain(mesh: Mesh, displacement: Floats, axes: Floats, at_ed: Floats) -
     ndarray of shape (n_frames, n_cells, n_points, 6)
         RR, CC, LL, RC, RL, CL.
     """
+    from echotruth.mechanics.solver import element  # compiled; whoever reads a heart needs none
+
     # With the wall at ED in place of the unloaded one, the gradient by its positions is F F_ED^-1.
     wall = element.build_elements(replace(mesh, nodes=mesh.nodes + at_ed), axes)
     c = np.empty((len(displacement), *wall.weight.shape, 6))
@@ -151,6 +152,8 @@ def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
     smallest, mean : ndarray of shape (n_frames,)
         The mean is weighted by unloaded volume.
     """
+    from echotruth.mechanics.solver import element
+
     wall = element.build_elements(mesh)
     volume, c = wall.weight, np.empty((*wall.weight.shape, 6))
     ratio = np.empty((2, len(displacement)))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from echotruth.aha import segment
 from echotruth.config import Config, Pathology
@@ -166,6 +165,8 @@ def _infarct_weight(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
     if border == 0:
         return core.astype(float)
     # Straight-line distance, even through the cavity, to the nearest of samples a quarter of an edge apart.
+    from scipy.spatial import KDTree
+
     distance, _ = KDTree(positions[infarcted]).query(positions[:, _CENTROID], distance_upper_bound=border)
     return np.where(core, 1.0, np.clip(1 - distance / border, 0, 1))
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-import imageio_ffmpeg
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -271,6 +270,8 @@ def mp4(path: Path, frames: np.ndarray) -> Path:
     -------
     Path
     """
+    import imageio_ffmpeg
+
     size = frames.shape[2], frames.shape[1]
     video = imageio_ffmpeg.write_frames(
         str(path), size, fps=FRAME_RATE, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2

@@ -14,13 +14,15 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from echotruth.imaging.labels import TissueLabel
+from echotruth.report.palette import BORDER as BORDER
+from echotruth.report.palette import FLOW as FLOW
+from echotruth.report.palette import MOTION as MOTION
+from echotruth.report.palette import TRACKED as TRACKED
 from echotruth.section import UNITS
 
 INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
@@ -117,9 +119,6 @@ what has none."""
 STRAIN_LIMIT = 30.0
 """Strain at the ends of the scale over images, %."""
 
-MOTION, TRACKED, FLOW, BORDER = "#ffb000", "#35d0ff", "#7dff6a", "#ff7ab6"
-"""Colours over images: of true paths, tracked paths, flow from frame to frame, and the true border of the wall."""
-
 SERIES = ("#7b3fa0", "#d1477e", "#b58900", "#3aa7d9", "#7a4b2a", "#5a9e1e")
 """Colours of trackers, in the order of their ranks, and of states of hearts: none is that of a quantity.
 Further trackers are grey."""
@@ -127,24 +126,6 @@ Further trackers are grey."""
 SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
 """Colour and marker of the image sizes, the largest first."""
 
-TISSUE_ENTRIES = {
-    TissueLabel.CAVITY: 6,
-    TissueLabel.WALL: 2,
-    TissueLabel.LEFT_ATRIUM: 8,
-    TissueLabel.RIGHT_VENTRICLE: 0,
-    TissueLabel.RIGHT_ATRIUM: 4,
-    TissueLabel.RIGHT_FREE_WALL: 1,
-    TissueLabel.ATRIAL_WALL: 9,
-    TissueLabel.MITRAL_LEAFLET: 16,
-    TissueLabel.PAPILLARY_MUSCLE: 3,
-    TissueLabel.LUNG: 19,
-    TissueLabel.CHEST_WALL: 10,
-    TissueLabel.AORTIC_ROOT: 12,
-    TissueLabel.AORTIC_WALL: 13,
-    TissueLabel.AORTIC_CUSP: 17,
-    TissueLabel.TRICUSPID_LEAFLET: 19,
-}
-"""Tissue to the entry of Matplotlib's `tab20`: blood in a full colour, its wall in a pale one."""
 
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 """Metadata of an SVG: none, so that nothing but the figure is in it."""
@@ -265,11 +246,6 @@ def volume(largest: float) -> Quantity:
 def series_colour(number: int) -> str:
     """Colour of the tracker with a place in the ranking, counted from 0."""
     return SERIES[number] if number < len(SERIES) else TARGET
-
-
-def tissue_colours() -> list[str]:
-    """Colours of the tissues of :class:`echotruth.imaging.labels.TissueLabel` from 1 on, as #rrggbb."""
-    return [to_hex(matplotlib.colormaps["tab20"](TISSUE_ENTRIES[label])) for label in TissueLabel if label]
 
 
 def layer_colours(layers: int) -> np.ndarray:

@@ -16,6 +16,7 @@ from echotruth.cases import Case, all_cases, find_case
 from echotruth.config import Config, shipped
 from echotruth.config.diagnosis import DECISIVE, bounds_of
 from echotruth.config.loading import load, validate
+from echotruth.extras import explained
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, before_probe, imaging_plane
 from echotruth.repository import estimates, group, metadata, schema, status
@@ -487,12 +488,13 @@ class Repository:
         >>> list(floors.columns[:4])
         ['case', 'view', 'size_px', 'floor_percent']
         """
-        from echotruth.evaluation.difficulty.table import difficulties
-
         found = self.case(case).id, self.view(view)
         if problem := self.problem(*found, "truth", "bmode"):
             raise ValueError(problem)
-        return difficulties(self, [found[0]], [found[1]])
+        with explained("difficulty"):
+            from echotruth.evaluation.difficulty.table import difficulties
+
+            return difficulties(self, [found[0]], [found[1]])
 
     @cached_property
     def every(self) -> dict[str, Case]:

@@ -4,7 +4,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy import ndimage
 
 REFERENCE_WALL_MM = 0.85
 """Thickness of the wall of the default mouse at end-diastole in a short axis, which the default lengths suit."""
@@ -38,7 +37,7 @@ def doubts(frames: np.ndarray, mask: np.ndarray, spacing: float, settings: Any) 
     list of str
         A plain sentence each, without a full stop.
     """
-    found = (_repetition(repeated(frames, mask)), _misfit(1e3 * spacing * wall_thickness(mask), settings))
+    found = (_repetition(repeated(frames, mask)), _misfit(mask, spacing, settings))
     return [text for text in found if text]
 
 
@@ -57,6 +56,8 @@ def repeated(frames: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 def wall_thickness(mask: np.ndarray) -> float:
     """Twice the largest distance of a pixel of the wall from the rest of the image (axial, lateral), px."""
+    from scipy import ndimage  # whoever brings a tracker needs none
+
     return 2 * float(ndimage.distance_transform_edt(mask).max())
 
 
@@ -76,11 +77,12 @@ def _repetition(same: np.ndarray) -> str:
     )
 
 
-def _misfit(thickness_mm: float, settings: Any) -> str:
-    """What is to be said of lengths that do not suit a wall of this thickness."""
+def _misfit(mask: np.ndarray, spacing: float, settings: Any) -> str:
+    """What is to be said of lengths that do not suit the thickness of the wall."""
     key = next((name for name in LENGTHS if getattr(settings, name, None)), "")
-    if not key or not thickness_mm > 0:
+    if not key or not mask.any():
         return ""
+    thickness_mm = 1e3 * spacing * wall_thickness(mask)
     default = type(settings).model_fields[key].get_default()
     given, usual = (float(np.ravel(length)[-1]) for length in (getattr(settings, key), default))
     suited = REFERENCE_WALL_MM * given / usual

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from echotruth.extras import explained
 from echotruth.section import Section
 from echotruth.tracking import trackers
 from echotruth.tracking.accumulation import Path
@@ -76,7 +77,8 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality of the points of a clip, by a method of ours or from outside."""
     if settings.method == "external":
         return trackers.function("external")(clip, settings)
-    path = tracked_path(clip, settings)
+    with explained(f"the tracker {settings.method}"):
+        path = tracked_path(clip, settings)
     return path.displacement, error_model(settings).probability(path, clip.shape)
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from echotruth.aha import SEGMENT_NAMES
 from echotruth.imaging.labels import TissueLabel
 from echotruth.report import style
-from echotruth.report.style import layer_colours, tissue_colours
+from echotruth.report.palette import TISSUES
+from echotruth.report.style import layer_colours
 from echotruth.viewer.clip import Clip
 from echotruth.viewer.points import Points
 
@@ -149,7 +150,7 @@ def _labels(clip: Clip, name: str) -> Tint:
     """Colours of numbered parts of the wall."""
     if name == "tissue":
         names = {int(one): one.name.lower().replace("_", " ") for one in TissueLabel if one}
-        return Tint(clip.tissue(), tissue_colours(), 0.5, len(names) + 0.5, "Tissue", names)
+        return Tint(clip.tissue(), list(TISSUES), 0.5, len(names) + 0.5, "Tissue", names)
     label = clip.label(name)
     if name == "segment":
         return _segments(label)

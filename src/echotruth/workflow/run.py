@@ -11,6 +11,7 @@ from typing import TextIO
 import psutil
 
 from echotruth.config import shipped
+from echotruth.extras import require
 from echotruth.workflow.progress import Progress
 
 POLL_SECONDS, LINE_SECONDS = 0.5, 30.0
@@ -23,6 +24,7 @@ LOG_LINES, MAX_LOGS = 15, 3
 
 def snakemake_command(path: Path | str, options: list[str], targets: list[str]) -> list[str]:
     """Command that runs the workflow of a configuration file, with options, and rules and files to make."""
+    require("snakemake")
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(shipped.ROOT / "Snakefile")]
     # Snakemake's lock is that of the working folder, where other names may run; a repository has its own.
     # --configfile takes all that follows it, up to the next option.

@@ -1,15 +1,14 @@
 """The truth drawn over B-mode images, on their own pixels, so that the scale stays."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
-import cv2
-import matplotlib
 import numpy as np
-from matplotlib.colors import to_rgb, to_rgba_array
 from numpy.typing import NDArray
+from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from echotruth.arrays import Floats
-from echotruth.report.style import BORDER, MOTION, tissue_colours
+from echotruth.report.palette import BORDER, MOTION, SEGMENTS, TISSUES
 from echotruth.sharing.export.clip import Clip
 
 OPACITY = 0.35
@@ -24,8 +23,8 @@ SCALE = "#f2f2f2"
 DEPTHS = 8
 """Marks of the depth scale, at most."""
 
-_SHIFT = 4
-"""Binary digits of a fraction of a pixel in OpenCV's coordinates."""
+_DETAIL = 4
+"""Pixels, along each axis, of which a drawing has one, so that its edges are smooth."""
 
 Pictures = NDArray[np.uint8]
 
@@ -55,17 +54,17 @@ def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
 
 def _segments(clip: Clip, frames: Pictures) -> None:
     """Colour the segments, those of AHA next to each other differently."""
-    _tint(frames, clip.truth("segment")["segment"].values, matplotlib.colormaps["tab10"](np.arange(1, 18) * 3 % 10))
+    _tint(frames, clip.truth("segment")["segment"].values, SEGMENTS)
 
 
 def _tissue(clip: Clip, frames: Pictures) -> None:
     """Colour the tissues."""
-    _tint(frames, clip.truth("tissue")["tissue"].values, to_rgba_array(tissue_colours()))
+    _tint(frames, clip.truth("tissue")["tissue"].values, TISSUES)
 
 
-def _tint(frames: Pictures, labels: Pictures, palette: Floats) -> None:
-    """Lay the colours (n, 4) of the numbers from 1 on over images."""
-    colours = np.vstack([np.zeros(3), palette[:, :3]]) * 255
+def _tint(frames: Pictures, labels: Pictures, palette: Sequence[str]) -> None:
+    """Lay the colours of the numbers from 1 on over images."""
+    colours = np.array([(0, 0, 0), *map(ImageColor.getrgb, palette)], float)
     for frame, numbers in zip(frames, labels, strict=True):
         tinted = (1 - OPACITY) * frame + OPACITY * colours[numbers]
         frame[:] = np.where(numbers[..., None] > 0, np.round(tinted), frame)
@@ -74,18 +73,27 @@ def _tint(frames: Pictures, labels: Pictures, palette: Floats) -> None:
 def _wall(clip: Clip, frames: Pictures) -> None:
     """Draw the border of the wall, half-way between the centres of pixels in and out of it."""
     for frame, mask in zip(frames, clip.truth("mask")["mask"].values, strict=True):
-        contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
-        cv2.drawContours(frame, contours, -1, _rgb(BORDER), _thickness(clip), cv2.LINE_AA)
+        inside = np.pad(mask.astype(bool), 1)
+        with _drawing(frame, BORDER) as draw:
+            for axis in (0, 1):
+                half = np.array([0.0, 0.0])
+                half[axis] = 0.5
+                # An edge of a pixel, from corner to corner: (row, column) to (lateral, axial).
+                corner = (np.argwhere(np.diff(inside, axis=axis)) - 1)[:, ::-1] + half[::-1]
+                for middle in corner:
+                    ends = _fine(np.stack([middle - half, middle + half]))
+                    draw.line(ends, 255, _DETAIL * _thickness(clip))
 
 
 def _displacement(clip: Clip, frames: Pictures) -> None:
     """Draw an arrow for each point of a grid that is in the wall at end-diastole."""
-    step = max(1, clip.size // ARROWS_ALONG_SIDE)
+    step, radius = max(1, clip.size // ARROWS_ALONG_SIDE), _thickness(clip)
     position = clip.tracks(step)["pixel"].values
     for frame, ends in zip(frames, position, strict=True):
-        for start, end in zip(_fixed(position[0]), _fixed(ends), strict=True):
-            cv2.line(frame, start, end, _rgb(MOTION), _thickness(clip), cv2.LINE_AA, _SHIFT)
-            cv2.circle(frame, end, _thickness(clip) << _SHIFT, _rgb(MOTION), -1, cv2.LINE_AA, _SHIFT)
+        with _drawing(frame, MOTION) as draw:
+            for start, end in zip(position[0], ends, strict=True):
+                draw.line(_fine(np.stack([start, end])), 255, _DETAIL * _thickness(clip))
+                draw.ellipse(_fine(np.stack([end - radius, end + radius])), 255)
 
 
 def _scale(clip: Clip, frames: Pictures) -> None:
@@ -99,13 +107,15 @@ def _scale(clip: Clip, frames: Pictures) -> None:
         for number, depth in enumerate(depths, start=1):
             start, at = clip.axial[0] - clip.spacing / 2, right - margin * (2 if number % 5 == 0 else 1)
             level = round((depth - start) / clip.spacing - 0.5)
-            cv2.line(frame, (at, level), (right, level), _rgb(SCALE), thickness)
-        cv2.line(frame, (left, row), (size // 2, row), _rgb(SCALE), thickness)
+            _bar(frame, (level, level), (at, right), thickness)
+        _bar(frame, (row, row), (left, size // 2), thickness)
         for moment, height in ((0.0, 3 * margin), (es, margin)):
             column = round(left + moment / period * (size // 2 - left))
-            cv2.line(frame, (column, row), (column, row - height), _rgb(SCALE), thickness)
+            _bar(frame, (row - height, row), (column, column), thickness)
         column = round(left + time / period * (size // 2 - left))
-        cv2.circle(frame, (column, row), 2 * thickness, _rgb(MOTION), -1, cv2.LINE_AA)
+        with _drawing(frame, MOTION) as draw:
+            dot = np.array([column, row])
+            draw.ellipse(_fine(np.stack([dot - 2 * thickness, dot + 2 * thickness])), 255)
         _write(frame, f"{1e3 * time:.0f} ms", (left + margin, row - 2 * margin))
         _write(frame, f"{1e3 * step:g} mm", (0, 2 * margin), right)
 
@@ -116,25 +126,37 @@ def _round_step(least: float) -> float:
     return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)))
 
 
+def _bar(frame: Pictures, rows: tuple[int, int], columns: tuple[int, int], thickness: int) -> None:
+    """Fill the pixels from the first to the last row and column with the colour of the scale."""
+    first, last = np.array([rows, columns]).T
+    first, last = np.maximum(first - (thickness - 1) // 2, 0), last + thickness // 2 + 1
+    frame[first[0] : last[0], first[1] : last[1]] = ImageColor.getrgb(SCALE)
+
+
 def _write(frame: Pictures, text: str, corner: tuple[int, int], right: int | None = None) -> None:
     """Write a text with its lower left corner at (column, row), or its right end at a column."""
-    scale = max(0.3, frame.shape[0] / 1000)
-    if right is not None:
-        corner = right - cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, scale, 1)[0][0], corner[1]
-    cv2.putText(frame, text, corner, cv2.FONT_HERSHEY_SIMPLEX, scale, _rgb(SCALE), 1, cv2.LINE_AA)
+    anchor, column = ("ls", corner[0]) if right is None else ("rs", right)
+    font = ImageFont.load_default(_DETAIL * max(9, 0.025 * len(frame)))
+    with _drawing(frame, SCALE) as draw:
+        draw.text(_fine(np.array([[column, corner[1]]]))[0], text, 255, font, anchor)
 
 
 DRAWINGS = {"segments": _segments, "tissue": _tissue, "wall": _wall, "displacement": _displacement, "scale": _scale}
 """Name of an overlay to the function that draws it, those below first."""
 
 
-def _fixed(position: NDArray[np.floating]) -> list[list[int]]:
-    """Positions (point, 2), px, as OpenCV takes fractions of a pixel."""
-    return np.round(position * (1 << _SHIFT)).astype(int).tolist()
+@contextmanager
+def _drawing(frame: Pictures, colour: str) -> Iterator[ImageDraw.ImageDraw]:
+    """Draw in one colour on an image, smoothly: 255 is all of it, at the places of :func:`_fine`."""
+    mask = Image.new("L", (_DETAIL * frame.shape[1], _DETAIL * frame.shape[0]))
+    yield ImageDraw.Draw(mask)
+    share = np.asarray(mask.reduce(_DETAIL))[..., None] / 255
+    frame[:] = np.round((1 - share) * frame + share * np.array(ImageColor.getrgb(colour)))
 
 
-def _rgb(colour: str) -> tuple[float, ...]:
-    return tuple(255 * part for part in to_rgb(colour))
+def _fine(position: Floats) -> list[tuple[float, float]]:
+    """Places in a drawing of positions (point, 2), lateral and axial, px of the image."""
+    return [tuple(place) for place in (_DETAIL * (position + 0.5) - 0.5).tolist()]
 
 
 def _thickness(clip: Clip) -> int:

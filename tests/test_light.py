@@ -1,0 +1,106 @@
+"""What echotruth does without the extra `make`: it reads, loads and scores, and says what the rest needs.
+
+The packages of the extra are absent for a process in which their names stand for no module.
+"""
+
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+from packaging.requirements import Requirement
+
+import echotruth as et
+from echotruth.extras import MAKE
+
+PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+
+LIGHT = f"""
+import sys
+for name in {MAKE!r}:
+    sys.modules[name] = None
+"""
+
+READ = """
+import numpy as np
+import echotruth as et
+
+hearts = et.sample()
+clip, heart = hearts.clip("infarct", "mid"), hearts.heart("infarct")
+
+def at_rest(frames, points, mask, spacing, frame_time, seed):
+    return np.zeros((len(frames), len(points), 2))
+
+scores = et.evaluate(et.track(clip, at_rest), heart)
+assert abs(scores["nrmse_percent"] - 100) < 1e-6, scores  # nothing found: all of the motion is an error
+stored = hearts.curves("infarct", "mid", "bspline_dic")
+assert float(abs(stored["true_line_strain"]).max()) > 0.05
+assert float(abs(et.kinematics(heart)["strain"]).max()) > 0.05
+chosen = et.learning.cases("sample")
+paths = et.learning.PointTracks("sample", chosen, points=8)[0]["position"]
+assert paths.shape == (10, 8, 2) and np.isfinite(paths).all()
+assert np.isfinite(et.learning.FlowPairs("sample", chosen)[0]["flow"]).any()
+"""
+
+WHOLE = "needs the package {}: pip install 'echotruth[make]'"
+NEEDED = {
+    "show sample --no-browser": "bokeh",
+    "run demo --dry-run": "scipy",
+    "track clip.npz --wall wall.csv --view mid --spacing-mm 1 --frame-time-ms 1": "matplotlib",
+    "export sample --format mp4 -o mp4": "imageio_ffmpeg",
+    "evaluate copy --tracker dis --name mine --case healthy --view mid": "cv2",
+}
+"""Command to the first package that it lacks."""
+
+COMMANDS = f"""
+from echotruth.cli import main
+for command in {[*NEEDED]!r}:
+    sys.argv = ["echotruth", *command.split()]
+    try:
+        main()
+    except SystemExit as end:
+        assert end.code == 2, (command, end.code)
+"""
+
+
+def light(program: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """A program in a folder and a process without the packages of the extra."""
+    command = [sys.executable, "-W", "error::RuntimeWarning", "-c", LIGHT + program]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_light_installation_reads_loads_and_scores(tmp_path):
+    done = light(READ, tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+def test_command_that_needs_more_says_which_extra_in_one_line(tmp_path):
+    shutil.copytree(et.sample().folder, tmp_path / "copy")
+    (tmp_path / "wall.csv").touch()
+    np.savez(tmp_path / "clip.npz", image=np.zeros((4, 8, 8)))
+    done = light(COMMANDS, tmp_path)
+    said = [f"echotruth: {command.split()[0]} {WHOLE.format(package)}" for command, package in NEEDED.items()]
+    said[-1] = f"echotruth: the tracker dis {WHOLE.format('cv2')}"
+    assert (done.returncode, done.stderr.splitlines()) == (0, said)
+
+
+def test_functions_that_need_more_say_which_extra(tmp_path):
+    """One that is imported with what it needs, and one that imports it when it is called."""
+    program = """
+import echotruth as et
+for call in (lambda: et.beat(), lambda: et.sample().difficulty("infarct", "mid")):
+    try:
+        call()
+    except ImportError as error:
+        print(error)
+"""
+    said = [f"echotruth.beat {WHOLE.format('numba')}", f"difficulty {WHOLE.format('scipy')}"]
+    assert light(program, tmp_path).stdout.splitlines() == said
+
+
+def test_extra_has_the_packages_that_are_named():
+    named = {"cv2": "opencv-python-headless", "skimage": "scikit-image", "imageio_ffmpeg": "imageio-ffmpeg"}
+    extra = {Requirement(entry).name for entry in PROJECT["optional-dependencies"]["make"]}
+    assert {named.get(package, package) for package in MAKE} == extra
