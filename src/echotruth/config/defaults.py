@@ -87,17 +87,17 @@ over those of the array."""
 REALISM_HARMONIC = {"human": 1.25}
 """`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
 its half. Presets that are not here have no harmonic imaging."""
-REALISM_SMOOTHING = {"mouse": 1 / 215, "human": 1 / 165}
-"""`realism.preset` -> default of `bmode.smoothing_width_px` over the side of the image."""
+REALISM_SMOOTHING = 1 / 260
+"""Default of `bmode.smoothing_width_px` over the side of the image, with any `realism.preset`."""
 REALISM_IMAGE: dict[str, Any] = {
     "probe.attenuation_dB_per_cm_MHz": 0.5,
-    "bmode.dynamic_range_dB": 50.0,
-    "bmode.grey_gamma": 1.3,
-    "bmode.smoothing": 0.65,
-    "bmode.dropout.edge_loss_dB": 17.0,
+    "bmode.dynamic_range_dB": 60.0,
+    "bmode.grey_gamma": 1.6,
+    "bmode.smoothing": 1.0,
+    "bmode.dropout.edge_loss_dB": 22.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_GAIN_DB = {"mouse": -11.0, "human": -7.5}
+REALISM_GAIN_DB = {"mouse": -13.0, "human": -9.5}
 """`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
@@ -107,7 +107,7 @@ REALISM_SCAN: dict[str, dict[str, float]] = {
 seen."""
 REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
     "mouse": {0.1: 7, 0.17: 4, 0.23: 2, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
-    "human": {0.1: 19.5, 0.17: 13.5, 0.23: 5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
+    "human": {0.1: 20, 0.17: 14, 0.23: 5.5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
 }
 """`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: with it, an even
 medium is as bright at any range of the default array."""
@@ -169,7 +169,7 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     name, size = str(_value(values, "realism.preset")), _value(values, "bmode.size_px") or 512
     if name not in REALISM_BANDWIDTHS:
         return {}
-    width = REALISM_SMOOTHING[name] * size if isinstance(size, int | float) else 2.0
+    width = REALISM_SMOOTHING * size if isinstance(size, int | float) else 2.0
     found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, name)
     found |= {"bmode.gain_dB": REALISM_GAIN_DB[name]} | _scan(array, name)
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:

@@ -168,7 +168,7 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
         },
         "borders": {"endocardium_dB": 10.0, "epicardium_dB": 10.0},
         "decorrelation": {"time_ms": times_ms[0]},
-        "blood": {"level_dB": -27.0, "density": 0.25, "decorrelation_time_ms": times_ms[1]},
+        "blood": {"level_dB": -28.0, "density": 0.25, "decorrelation_time_ms": times_ms[1]},
         "surroundings": {"level_dB": -5.5, "density": 0.25, "start_mm": scale, "motion_decay_mm": scale},
         "neighbours": {
             "chambers_dB": 0.0,
@@ -196,9 +196,9 @@ REALISM_PRESETS: dict[str, dict[str, Any]] = {
         {
             "backscatter": {"fibre_strain_dB": 10.0},
             "noise": {"snr_dB": 75.0},
-            "haze": {"level_dB": -3.0},
+            "haze": {"level_dB": -4.0},
             "aberration": {"delay_ns": 21.3, "correlation_length_mm": 2.5},
-            "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -4.0},
+            "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -6.0},
         },
     ),
 }

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.heart import Heart
-from echotruth.imaging.beamforming.scan import Scan, imaging_depth, scan_lines
+from echotruth.imaging.beamforming.scan import Scan, scan_lines
 from echotruth.imaging.bmode import ScanConversion, pixel_centres
 from echotruth.imaging.doppler import Estimator, along_beam, velocity_images
 from echotruth.imaging.packet import MovingHeart, PacketSequence
@@ -136,7 +136,7 @@ def _prf(config: Config, packet: int, moving: MovingHeart, scan: Scan, given: fl
     """Pulse repetition frequency, Hz: the one given, or the default, once it and the packet are possible."""
     if not isinstance(packet, (int, np.integer)) or packet < 2:
         raise ValueError(f"packet = {packet!r}: give a whole number of pulses, two or more.")
-    p, depth = config.probe.si(), imaging_depth(config.rf, config.bmode)
+    p, depth = config.probe.si(), config.bmode.si().field_of_view
     lowest, highest = packet / moving.period, p.sound_speed / (2 * depth)
     if given is not None:
         if not lowest <= given <= highest:

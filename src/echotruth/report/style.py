@@ -19,10 +19,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from echotruth.report.palette import BORDER as BORDER
-from echotruth.report.palette import FLOW as FLOW
-from echotruth.report.palette import MOTION as MOTION
-from echotruth.report.palette import TRACKED as TRACKED
+from echotruth.report.palette import BORDER, FLOW, MOTION, TRACKED  # noqa: F401
 from echotruth.section import UNITS
 
 INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
