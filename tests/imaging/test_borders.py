@@ -32,7 +32,7 @@ def test_scatterers_are_spread_evenly_over_the_surface(heart):
     border = Epicardium.seed(scene(CONFIG, heart))
     position = border.scene.plane.to_heart(border.positions(0))
     probe = CONFIG.probe.si()
-    expected = 2 * np.pi * (3e-3 * probe.frequency / probe.sound_speed) ** 2  # half a sphere, one per square wavelength
+    expected = np.pi * (3e-3 * probe.frequency / probe.sound_speed) ** 2  # half a sphere
     assert abs(len(position) - expected) < 5 * np.sqrt(expected) + 0.01 * expected
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 3e-3, rtol=2e-3)
     # The height of points that are even on a sphere is even.

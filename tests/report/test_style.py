@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.lines import Line2D
 
 import echotruth
-from echotruth.report import style
+from echotruth.report import palette, style
 
 TRACKERS = ("as_published", "corrected", "window_deformation", "affine_dic", "dis", "dis_fine", "bspline_dic")
 
@@ -58,7 +58,7 @@ def test_no_other_module_of_the_package_names_a_colour_of_a_quantity():
     found = {
         path.name: sorted(colours)
         for path in sources
-        if path != Path(style.__file__)
+        if path not in (Path(style.__file__), Path(palette.__file__))
         and (colours := named & set(re.findall(r"#[0-9a-f]{6}\b", path.read_text(encoding="utf-8").lower())))
     }
     assert found == {}

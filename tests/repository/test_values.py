@@ -70,7 +70,7 @@ def test_whole_heart_has_no_fault(groups):
         ("truth/64", "labels", (2, 1, 2, 3), 0, "a pixel of the wall without a segment"),
         ("truth/64", "labels", (2, 1, 2, 3), 18, "has a segment of 18, above 17"),
         ("truth/64", "labels", (2, 0, 2, 3), 7, "has a layer of 7, above 6"),
-        ("truth/64", "tissue", (2, 2, 3), 12, "has a value of 12, above 11"),
+        ("truth/64", "tissue", (2, 2, 3), 16, "has a value of 16, above 15"),
         ("truth/64", "tissue", (2, 2, 3), 1, "is not the wall in a pixel of the wall"),
         ("truth/64", "flow", (1, 0, 2, 3, 2), NAN, "in a pixel of the wall from which there is a frame"),
         ("truth/64", "flow", (2, 1, 2, 3), 0.0, "or is one elsewhere"),

@@ -51,7 +51,8 @@ def test_every_heart_has_ideal_acoustics_and_realistic_ones_have_what_clips_have
         realism = case.config.realism
         levels = realism.blood.level_dB, realism.noise.snr_dB, realism.haze.level_dB, realism.decorrelation.time_ms
         levels += realism.surroundings.level_dB, *realism.borders.model_dump().values()
-        levels += tuple(realism.neighbours.model_dump().values())
+        # The tables are older than what lies behind the atria.
+        levels += tuple(realism.neighbours.model_dump(exclude={"posterior_dB"}).values())
         assert all((level is None) == (case.labels["acoustics"] == "ideal") for level in levels), case.id
         backscatter = realism.backscatter
         depends = [backscatter.anisotropy_dB > 0, backscatter.fibre_strain_dB > 0]
@@ -115,7 +116,7 @@ def differences(one, other, key=""):
 def test_ablation_has_hearts_of_develop_with_one_thing_taken_from_their_acoustics(monkeypatch):
     monkeypatch.chdir(ROOT)
     whole = {case.id: case for case in expand(load("config/benchmark.yaml"))}
-    neighbours = {f"realism.neighbours.{key}" for key in Neighbours.model_fields}
+    neighbours = {f"realism.neighbours.{key}" for key in Neighbours.model_fields if key != "posterior_dB"}
     taken = {
         "five_foci": {"rf.focal_zones"},
         "no_rib": {"realism.shadow.side"},

@@ -42,8 +42,8 @@ def check_pixels(bmode: Bmode, frames: int) -> None:
 def check_samples(probe: Probe, bmode: Bmode, lines: int, frames: int) -> None:
     """Check the number of samples of a frame's RF, and of a clip's lines."""
     side = bmode.field_of_view_mm
-    # Both ways, in samples per mm; the corners of the image are 1.12 times as deep.
-    per_mm = 2 * 1.12 * probe.sampling_MHz * 1e3 / probe.sound_speed_m_per_s
+    # Both ways, in samples per mm.
+    per_mm = 2 * probe.sampling_MHz * 1e3 / probe.sound_speed_m_per_s
     pairs = probe.elements * (probe.elements + 1) // 2
     for number, what in ((pairs, f"{probe.elements} elements"), (frames * lines, f"{frames} frames of {lines} lines")):
         most = MAX_SAMPLES / number / per_mm

@@ -82,7 +82,7 @@ ACOUSTICS: dict[str, dict[str, Any]] = {
     "realism.borders.endocardium_dB": {"uniform": [5, 18]},
     "realism.borders.epicardium_dB": {"uniform": [8, 25]},
     "realism.blood.level_dB": {"uniform": [-30, -14]},
-    "realism.surroundings.level_dB": {"uniform": [-20, -3]},
+    "realism.surroundings.level_dB": {"uniform": [-20, -2]},
     "realism.neighbours.posterior_dB": {"uniform": [-5, 8]},
     "realism.noise.snr_dB": {"uniform": [45, 80]},
     "realism.haze.level_dB": {"uniform": [-20, -4]},
@@ -91,11 +91,11 @@ ACOUSTICS: dict[str, dict[str, Any]] = {
     "bmode.dynamic_range_dB": {"uniform": [45, 70]},
     "bmode.gain_dB": {"uniform": [-20, 3]},
     "bmode.grey_map": {"choice": ["linear", "s_curve"]},
-    "bmode.grey_gamma": {"uniform": [0.7, 1.5]},
-    "bmode.smoothing": {"uniform": [0, 0.8]},
+    "bmode.grey_gamma": {"uniform": [0.7, 1.8]},
+    "bmode.smoothing": {"uniform": [0, 1]},
     "bmode.edge_enhancement": {"uniform": [0, 1]},
     "bmode.dropout.loss_dB": {"uniform": [0, 10]},
-    "bmode.dropout.edge_loss_dB": {"uniform": [0, 20]},
+    "bmode.dropout.edge_loss_dB": {"uniform": [0, 25]},
 }
 """Distributions of `cases.draw.preset: acoustics`; docs/realism.md says where each range is from."""
 HEARTS: dict[str, dict[str, Any]] = {

@@ -94,11 +94,12 @@ REALISM_IMAGE: dict[str, Any] = {
     "bmode.dynamic_range_dB": 60.0,
     "bmode.grey_gamma": 1.6,
     "bmode.smoothing": 1.0,
-    "bmode.dropout.edge_loss_dB": 22.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
 REALISM_GAIN_DB = {"mouse": -13.0, "human": -9.5}
 """`realism.preset` -> default of `bmode.gain_dB`."""
+REALISM_EDGE_LOSS_DB = 22.0
+"""Default of `bmode.dropout.edge_loss_dB` of sectors, with any `realism.preset`."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
     "human": {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
@@ -172,6 +173,8 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     width = REALISM_SMOOTHING * size if isinstance(size, int | float) else 2.0
     found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, name)
     found |= {"bmode.gain_dB": REALISM_GAIN_DB[name]} | _scan(array, name)
+    if any(_value(values, f"bmode.time_gain.{key}") for key in ("range_mm", "gain_dB")):
+        found = {key: value for key, value in found.items() if not key.startswith("bmode.time_gain")}
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
     share, density, ratio = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3", 1.0
@@ -188,6 +191,8 @@ def _scan(array: str, realism: str) -> dict[str, Any]:
         return {}
     default, gain = ARRAY_DEFAULTS[array], REALISM_TIME_GAIN_DB[realism]
     scan = {key: round(share * default[key], 3) for key, share in REALISM_SCAN[realism].items()}
+    if default.get("rf.scan") != "linear":
+        scan["bmode.dropout.edge_loss_dB"] = REALISM_EDGE_LOSS_DB
     ranges = [round(share * default["bmode.field_of_view_mm"], 3) for share in gain]
     return scan | {
         "bmode.time_gain.range_mm": ranges,
@@ -197,7 +202,10 @@ def _scan(array: str, realism: str) -> dict[str, Any]:
 
 def _harmonic(values: dict[str, Any], array: str, realism: str) -> dict[str, Any]:
     """Defaults of dotted keys of harmonic imaging, unless it is not that of a preset, or is turned off."""
-    if realism not in REALISM_HARMONIC or array not in ARRAY_PRESETS or _value(values, "rf.harmonic") is False:
+    unfocused = _value(values, "rf.transmit") not in (None, "focused")
+    if realism not in REALISM_HARMONIC or array not in ARRAY_PRESETS or unfocused:
+        return {}
+    if _value(values, "rf.harmonic") is False:
         return {}
     frequency = round(REALISM_HARMONIC[realism] * ARRAY_PRESETS[array]["frequency_MHz"], 3)
     return {"rf.harmonic": True, "rf.transmit_apodization": "none", "probe.frequency_MHz": frequency}

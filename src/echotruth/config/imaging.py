@@ -163,7 +163,8 @@ class Rf(Section):
     harmonic: bool = False
     """Harmonic imaging: echoes are those of the second harmonic of a wave, which is sent at half of
     `probe.frequency_MHz`. A focused beam is the square of that wave's, narrower and with lower side lobes, and echoes
-    grow in proportion to range up to `focus_mm`. Default: true with `realism.preset: human`."""
+    grow in proportion to range up to `focus_mm`. Default: true with `realism.preset: human`; where `cases` change it,
+    the frequency stays, so give that too."""
     f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
     """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range. Default: 2 for
     `mouse_linear_40MHz`."""
@@ -180,6 +181,11 @@ class Rf(Section):
     def focal_half_span_mm(self) -> float:
         """Distance of the nearest and of the farthest transmit focus from `focus_mm`, mm."""
         return (self.focal_zones - 1) / 2 * self.focal_spacing_mm if self.transmit == "focused" else 0.0
+
+    @check
+    def _check_harmonic(self) -> None:
+        remedy = "must be false, as only a focused beam has a harmonic that is known"
+        self.require(not self.harmonic or self.transmit == "focused", "harmonic", remedy)
 
     @check
     def _check_foci(self) -> None:

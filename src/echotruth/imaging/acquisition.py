@@ -78,7 +78,8 @@ class Acquisition:
         if not self._growth_range:
             return amplitude
         # Of a plane wave whose attenuation is proportional to frequency: its loss is that of a wave sent as harmonic.
-        return amplitude * np.minimum(np.linalg.norm(position, axis=1) / self._growth_range, 1)
+        _, range_ = self._scanner.scan.to_scan_coordinates(position[:, 0], position[:, 1])
+        return amplitude * np.minimum(range_ / self._growth_range, 1)
 
     def _aberrated(self, matrix: np.ndarray) -> np.ndarray:
         """The record (bins, receivers, transmitters) after the screen, which overwrites it."""

@@ -1,7 +1,6 @@
 """Motion of the tissue from one frame to the next and to the one before, and the slice of tissue that is imaged."""
 
 from functools import lru_cache
-from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,8 +73,7 @@ def slice_thickness(config: Config, range_: Floats) -> Floats:
     """
     if config.phantom.in_plane_only or not config.rf.elevation_beam:
         return np.full(np.shape(range_), np.inf)
-    side = config.bmode.si().field_of_view
-    return np.interp(range_, *_table(config.probe, hypot(side, side / 2)))
+    return np.interp(range_, *_table(config.probe, config.bmode.si().field_of_view))
 
 
 @lru_cache(maxsize=64)

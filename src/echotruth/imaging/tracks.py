@@ -67,6 +67,6 @@ def visible(config: Config, followed: Floats, thickness: float | Floats | None =
     shown = (np.abs(lateral) <= side / 2) & (axial >= 0) & (axial <= side)
     scan = scan_lines(config.probe, config.rf)
     line, range_ = scan.to_scan_coordinates(lateral, axial)
-    shown &= (line >= 0) & (line <= len(scan.angle) - 1)
+    shown &= (line >= 0) & (line <= len(scan.angle) - 1) & (range_ <= side)
     limit = slice_thickness(config, range_) if thickness is None else np.asarray(thickness)
     return shown & ~out_of_slice(elevation, limit)

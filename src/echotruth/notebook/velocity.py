@@ -138,7 +138,12 @@ def _prf(config: Config, packet: int, moving: MovingHeart, scan: Scan, given: fl
         raise ValueError(f"packet = {packet!r}: give a whole number of pulses, two or more.")
     p, depth = config.probe.si(), config.bmode.si().field_of_view
     lowest, highest = packet / moving.period, p.sound_speed / (2 * depth)
+    if lowest > highest:
+        most = f"give at most {floor(highest * moving.period)}, which fit into a cycle at {floor(highest)} Hz"
+        raise ValueError(f"packet = {packet}: {most}.")
     if given is not None:
+        if isinstance(given, bool) or not isinstance(given, (int, float, np.number)):
+            raise ValueError(f"prf_Hz = {given!r}: give a number.")
         if not lowest <= given <= highest:
             limits = f"give {lowest:.4g} to {floor(highest)}"
             why = "so that the packet ends within a cycle and the echoes of a pulse before the next one"

@@ -37,6 +37,8 @@ def opening(volume: Floats) -> Floats:
     where the cavity does not fill.
     """
     share = _opened(volume, np.roll(volume, -1) - volume)
+    # A cavity may still fill after the first frame, before it empties: that is no part of diastole.
+    share[: volume.argmin()] = 0
     if (filling := np.flatnonzero(share > HALF_OPEN)).size:
         diastole = slice(filling[0], filling[-1] + 1)
         share[diastole] = np.maximum(share[diastole], HALF_OPEN)

@@ -20,7 +20,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import FOLLOWING_BASE, above_lid
-from echotruth.imaging.medium.aortic_valve import AorticCusps, AorticValve
+from echotruth.imaging.medium.aortic_valve import AorticValve
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.mitral_valve import MitralValve
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
@@ -87,7 +87,8 @@ class TissueImages:
         scan = scan_lines(self._config.probe, self._config.rf)
         line, range_ = scan.to_scan_coordinates(self._lateral, self._axial[:, None])
         begins = self._config.realism.surroundings.si().start
-        return (line < 0) | (line > len(scan.angle) - 1) | (range_ < begins)
+        beyond = (range_ < begins) | (range_ > self._config.bmode.si().field_of_view)
+        return (line < 0) | (line > len(scan.angle) - 1) | beyond
 
     @cached_property
     def _motions(self) -> list[Callable[[int], Floats]]:
@@ -156,7 +157,7 @@ class TissueImages:
         bodies: list[tuple[TissueLabel, CavityPart]] = []
         if levels.leaflets_dB is not None:
             bodies.append((TissueLabel.MITRAL_LEAFLET, MitralValve(self._heart)))
-        if AorticCusps.level_dB(self._config) is not None:
+        if levels.chambers_dB is not None:
             bodies.append((TissueLabel.AORTIC_CUSP, AorticValve(self._heart)))
             bodies.append((TissueLabel.TRICUSPID_LEAFLET, TricuspidValve(self._heart)))
         if levels.papillary_muscles_dB is not None:

@@ -11,12 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, hypot, pi, radians
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium import arc
@@ -120,6 +121,11 @@ class TricuspidLeaflets(CavityBody):
     name, level = "tricuspid_leaflets", "neighbours.leaflets_dB"
     place: Floats
     amplitude: Floats
+
+    @classmethod
+    def level_dB(cls, config: Config) -> Any:
+        """As of the mitral leaflets, if there are chambers, between two of which the valve is."""
+        return None if config.realism.neighbours.chambers_dB is None else super().level_dB(config)
 
     @classmethod
     def seed(cls, scene: Scene) -> Self:
