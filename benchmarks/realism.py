@@ -349,7 +349,7 @@ def main() -> None:
         heart, plane = before_probe(solved(config, given.cache / f"{species}.npz"), config, VIEW)
         rows = [measures(each) for each in our_pictures(config, heart, plane)]
         results[name] = summary(rows, 0)
-        print(name, {row: round(values[1], 2) for row, values in results[name].items()}, flush=True)
+        print(name, {row: _shown(values[1]) for row, values in results[name].items()}, flush=True)
     file.write_text(json.dumps(results, indent=1) + "\n")
     file.with_suffix(".md").write_text(report(results))
 

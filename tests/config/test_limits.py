@@ -104,7 +104,7 @@ ABSURD = {
     "loop: {frames: 1000}\nbmode: {size_px: 4096}": "size_px = 4096: must be at most 1000 with loop.frames = 1000",
     "loop: {heart_rate_per_min: 1.0e-300}": "heart_rate_per_min = 1e-300: should be greater than or equal to 1",
     "bmode: {field_of_view_mm: 1.0e+12}": "field_of_view_mm = 1000000000000.0: should be less than or equal to 1000",
-    "bmode: {field_of_view_mm: 1000}\nprobe: {elements: 512}": "at most 105 with 512 elements sampled at 100 MHz",
+    "bmode: {field_of_view_mm: 1000}\nprobe: {elements: 512}": "at most 117 with 512 elements sampled at 100 MHz",
     "bmode: {field_of_view_mm: 900}\nloop: {frames: 1000}\nrf: {lines: 2048}": "with 1000 frames of 2048 lines sampled",
     "geometry: {wall_mm: 1.0e+300}": "geometry.wall_mm = 1e+300: should be less than or equal to 1000000000000",
 }
