@@ -205,6 +205,7 @@ def test_point_outside_the_wall_has_no_track(twisting_heart, mid):
         ((0.0, 6.5e-3, -0.185e-3), False),
         ((0.0, 12.1e-3, 0.0), False),
         ((6.1e-3, 11e-3, 0.0), False),
+        ((5.0e-3, 11.5e-3, 0.0), False),  # in the square, beyond the arc at which the sector ends
         ((3.0e-3, 5.0e-3, 0.0), True),
         ((3.0e-3, 4.0e-3, 0.0), False),  # outside of the sector of 64 degrees
         ((np.nan, np.nan, np.nan), False),

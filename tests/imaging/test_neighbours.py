@@ -12,6 +12,7 @@ from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import Anatomy
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.filling import aortic_opening, emptied, opening, volumes
+from echotruth.imaging.medium.medium import bodies
 from echotruth.imaging.medium.surroundings import Surroundings, tissues
 
 LEVELS = {
@@ -148,6 +149,16 @@ def test_the_valve_is_open_while_the_cavity_fills(heart):
     # It empties by 8/25 in the two frames after the first two.
     aortic = aortic_opening(volume)
     assert (aortic[[1, 2]] == 1).all() and (aortic[[0, 3, 4, 5, 6]] == 0).all()
+
+
+def test_the_mitral_valve_is_shut_while_the_cavity_empties_though_it_fills_a_little_before():
+    open_ = opening(np.array([97.0, 100, 100, 85, 65, 50, 50, 60, 75, 85, 92, 97]))
+    assert (open_[:6] == 0).all() and open_[7] == 1
+
+
+def test_there_are_no_valves_of_chambers_without_chambers():
+    config = Config.model_validate({"realism": REALISM | {"neighbours": {"leaflets_dB": 3.0}}})
+    assert {body.name for body in bodies(config)} == {"wall", "blood", "surroundings", "leaflets"}
 
 
 def test_the_mitral_valve_opens_twice_and_is_half_open_between():

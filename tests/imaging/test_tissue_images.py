@@ -93,6 +93,8 @@ def test_scatterers_around_the_heart_are_in_pixels_of_their_label(at, truth):
                 assert alike.mean() > 0.97, (frame, TissueLabel(tissue).name, labels)
         assert over.mean() < 0.1
     assert {TissueLabel.OTHER, TissueLabel.RIGHT_VENTRICLE, TissueLabel.LUNG, TissueLabel.CHEST_WALL} <= seen
+    beyond = np.hypot(LATERAL, AXIAL[:, None]) > 12e-3
+    assert beyond.sum() > 100 and not truth["tissue"][:, beyond].any()
 
 
 def test_bodies_in_the_cavity_are_where_their_scatterers_are(at, heart, plane):
