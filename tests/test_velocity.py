@@ -119,6 +119,8 @@ def test_realistic_echoes_of_a_beating_heart_have_its_velocity():
     [
         ({"packet": 1}, "packet = 1: give a whole number of pulses, two or more"),
         ({"packet": 2.5}, "packet = 2.5: give a whole number"),
+        ({"packet": 10**6}, "packet = 1000000: give at most [0-9]+, which fit into a cycle"),
+        ({"prf_Hz": "1000"}, "prf_Hz = '1000': give a number"),
         ({"packet": True}, "packet = True: give a whole number"),
         ({"prf_Hz": 0}, "prf_Hz = 0: give 41.67 to"),
         ({"prf_Hz": float("nan")}, "prf_Hz = nan: give"),
