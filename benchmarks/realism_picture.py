@@ -21,7 +21,7 @@ from physiology_pictures import ELEMENTS, save
 
 import echotruth as et
 from echotruth.config import Config
-from echotruth.imaging.bmode import bmode_clip, time_gain_compensation
+from echotruth.imaging.bmode import bmode_clip, clip_gain
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.view import before_probe
 from echotruth.report import style
@@ -67,7 +67,7 @@ def imaged(heart: et.Heart, config: Config, view: str) -> Pair:
     shown, plane = before_probe(heart, config, view)
     sequence = Sequence(config, shown, plane, realism.random)
     scanner, acquire = sequence.scanner, sequence.acquisition(sequence.scatterers())
-    gain = time_gain_compensation(config.probe, config.bmode, scanner.range)
+    gain = clip_gain(config.probe, config.bmode, len(scanner.scan.angle), scanner.range, realism.random("dropout"))
     compressed = partial(bmode_clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode, gain=gain)
     lines = np.stack([scanner.beamform(acquire(frame)) for frame in (0, heart.es)])
     side = config.bmode.field_of_view_mm
@@ -82,7 +82,7 @@ def real() -> Pair:
     (top, middle), (rows, columns) = REAL_TIP, frames.shape[1:]
     row, column = np.indices((rows, columns))
     reach, angle = np.hypot(row - top, column - middle), np.degrees(np.arctan2(column - middle, row - top))
-    _, _, half, _, last = realism.REAL_SECTOR
+    _, _, half, _, last = realism.SECTOR
     frames = np.where((np.abs(angle) < half) & (reach < last / 2), frames, 0).astype(np.uint8)
     left, upper = (-REAL_MM * edge for edge in (middle, top))
     return Pair(frames, (left, left + REAL_MM * columns, upper + REAL_MM * rows, upper))
