@@ -98,8 +98,9 @@ REALISM_IMAGE: dict[str, Any] = {
 """Defaults of dotted keys with any `realism.preset`."""
 REALISM_GAIN_DB = {"mouse": -13.0, "human": -9.5}
 """`realism.preset` -> default of `bmode.gain_dB`."""
-REALISM_EDGE_LOSS_DB = 22.0
-"""Default of `bmode.dropout.edge_loss_dB` of sectors, with any `realism.preset`."""
+REALISM_EDGE_LOSS_DB, REALISM_EDGE_DEG = 22.0, 85.0
+"""Default of `bmode.dropout.edge_loss_dB` of a sector, with any `realism.preset`, and the opening angle of that sector;
+of others it is that of lines at the same angle."""
 REALISM_SCAN: dict[str, dict[str, float]] = {
     "mouse": {},
     "human": {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
@@ -192,7 +193,8 @@ def _scan(array: str, realism: str) -> dict[str, Any]:
     default, gain = ARRAY_DEFAULTS[array], REALISM_TIME_GAIN_DB[realism]
     scan = {key: round(share * default[key], 3) for key, share in REALISM_SCAN[realism].items()}
     if default.get("rf.scan") != "linear":
-        scan["bmode.dropout.edge_loss_dB"] = REALISM_EDGE_LOSS_DB
+        sector = scan.get("rf.sector_deg", default["rf.sector_deg"])
+        scan["bmode.dropout.edge_loss_dB"] = round(REALISM_EDGE_LOSS_DB * (sector / REALISM_EDGE_DEG) ** 2, 1)
     ranges = [round(share * default["bmode.field_of_view_mm"], 3) for share in gain]
     return scan | {
         "bmode.time_gain.range_mm": ranges,
