@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import zarr
+from finished_repository import OPTIONAL
 
 from echotruth.repository import schema
 from echotruth.repository.places import group_of
@@ -49,15 +50,5 @@ def test_every_array_is_in_a_finished_repository_but_for_those_that_are_asked_fo
     store = next(finished.glob("*.zarr"))
     found = {path.parent.name for path in store.rglob("zarr.json")}
     wanted = [array.name for kind, arrays in schema.KINDS.items() if "inference" not in kind for array in arrays]
-    bodies = (
-        "blood",
-        "endocardium",
-        "epicardium",
-        "surroundings",
-        "leaflets",
-        "aortic_cusps",
-        "tricuspid_leaflets",
-        "papillary_muscles",
-    )
-    asked = (*bodies, "papillary_muscles", "channels")
+    asked = tuple(name for name in OPTIONAL if name != "transmit")
     assert [name for name in wanted if name not in found and not name.startswith(asked)] == []

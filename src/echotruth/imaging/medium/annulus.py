@@ -108,10 +108,8 @@ def span(commissural: Floats) -> Floats:
 
 def annulus_distance(place: Floats) -> Floats:
     """Distance (n,) of coordinates (n, 3) in the rim from the annulus: the rim outside of the root, or its edge."""
-    outer, from_root = (
-        AORTIC_RADIUS + AORTIC_WALL,
-        np.linalg.norm((place - AORTIC_DISTANCE * AORTIC_OUTWARDS)[:, :2], axis=1),
-    )
+    outer = AORTIC_RADIUS + AORTIC_WALL
+    from_root = np.linalg.norm((place - AORTIC_DISTANCE * AORTIC_OUTWARDS)[:, :2], axis=1)
     anterior, commissural, up = place.T
     from_rim = np.hypot(anterior, commissural)
     circle = np.where(from_root > outer, np.abs(from_rim - 1), np.inf)

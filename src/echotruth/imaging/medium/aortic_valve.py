@@ -10,22 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, hypot, pi, radians
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium import arc
-from echotruth.imaging.medium.annulus import Rim, Ring, box_of
+from echotruth.imaging.medium.annulus import Rim, box_of
 from echotruth.imaging.medium.aortic_root import valve_ring
-from echotruth.imaging.medium.body import CavityBody, Scene
+from echotruth.imaging.medium.body import Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
+from echotruth.imaging.medium.chamber_valve import AZIMUTH, ChamberLeaflets, ChamberValve
 from echotruth.imaging.medium.filling import aortic_opening, course
-from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
 MEETING = (0.97, 0.75)
 """Where the edges are when shut, from the annulus towards the axis and along it, over the radius of the annulus."""
@@ -37,17 +36,10 @@ NARROWING = 0.7
 """How much less of a cusp there is at its edge than at its base."""
 THICKNESS = 0.08
 """Over the radius of the annulus: 1 mm in the human preset."""
-POINTS = 12
-"""Of the annulus, by which its motion is known."""
 
 
-class AorticValve:
+class AorticValve(ChamberValve):
     """Where the cusps are.
-
-    Attributes
-    ----------
-    opening : ndarray of shape (frame,)
-        As of :func:`echotruth.imaging.medium.filling.aortic_opening`.
 
     Parameters
     ----------
@@ -56,28 +48,20 @@ class AorticValve:
         As of :class:`echotruth.imaging.medium.body.Scene`.
     """
 
-    def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
-        self.opening = course(aortic_opening, heart, between)
-        self._azimuth = np.linspace(0, 2 * pi, POINTS, endpoint=False)
-        points = valve_ring(Rim(heart)(0), self._azimuth)
-        # With the base, as the root does; a decay length has no part in that.
-        self._motion = SurroundingsMotion(heart, points, 1.0, np.full(POINTS, TissueLabel.AORTIC_WALL, np.uint8))
+    shut, turn, open_ = atan2(MEETING[1], MEETING[0]), TURN, OPEN
 
-    def ring(self, frame: int) -> Ring:
-        """The aortic annulus in a frame."""
-        points = self._motion(frame)
-        area = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
-        return Ring.of(points, self._azimuth, area / np.linalg.norm(area))
+    def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
+        annulus = valve_ring(Rim(heart)(0), AZIMUTH)
+        super().__init__(heart, annulus, TissueLabel.AORTIC_WALL, course(aortic_opening, heart, between))
 
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest coordinates, (3,), m, in the heart frame, that the cusps reach in any frame."""
-        rings = [self.ring(frame) for frame in range(len(self.opening))]
-        return box_of(rings, np.array([-1.1, -1.1, -0.1]), np.array([1.1, 1.1, _length() + 0.1]))
+        return box_of(self.rings, np.array([-1.1, -1.1, -0.1]), np.array([1.1, 1.1, _length() + 0.1]))
 
     def cusp(self, frame: int, azimuth: Floats, share: Floats) -> Floats:
         """Points of the cusps in a frame, (n, 3), m, at azimuths (n,), rad, and shares (n,) of their length."""
-        inward, up = (_length() * arc.points(*self._angles(frame), share)).T
+        inward, up = (_length() * arc.points(*self.angles(frame), share)).T
         radius = 1 - inward
         return self.ring(frame).to_heart(np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), up]))
 
@@ -86,19 +70,13 @@ class AorticValve:
         place = self.ring(frame).to_ring(position)
         profile = np.column_stack([1 - np.hypot(place[:, 0], place[:, 1]), place[:, 2]]) / _length()
         inside: NDArray[np.bool_] = np.abs(profile - 0.5).max(axis=1) < 0.6
-        share, across = arc.inverse(*self._angles(frame), profile[inside])
+        share, across = arc.inverse(*self.angles(frame), profile[inside])
         inside[inside] = (share > 0) & (share < 1) & (np.abs(across) * _length() < THICKNESS / 2)
         return inside
 
-    def _angles(self, frame: int) -> tuple[float, float]:
-        """Angles of a cusp above the annulus at base and edge in a frame, rad."""
-        share, middle = float(self.opening[frame]), atan2(MEETING[1], MEETING[0])
-        first, last = middle - TURN / 2, middle + TURN / 2
-        return first + (OPEN - first) * share, last + (OPEN - last) * share
-
 
 @dataclass(frozen=True, eq=False)
-class AorticCusps(CavityBody):
+class AorticCusps(ChamberLeaflets):
     """Scatterers of the aortic valve.
 
     Attributes
@@ -108,14 +86,9 @@ class AorticCusps(CavityBody):
     amplitude : ndarray of shape (n,)
     """
 
-    name, level = "aortic_cusps", "neighbours.leaflets_dB"
+    name = "aortic_cusps"
     place: Floats
     amplitude: Floats
-
-    @classmethod
-    def level_dB(cls, config: Config) -> Any:
-        """As of the mitral leaflets, if there are chambers, of which the aortic root is one."""
-        return None if config.realism.neighbours.chambers_dB is None else super().level_dB(config)
 
     @classmethod
     def seed(cls, scene: Scene) -> Self:

@@ -10,23 +10,22 @@ the mitral valve; here the whole annulus is, by 5 mm. All lengths and angles wer
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import atan2, hypot, pi, radians
-from typing import Any, Self
+from math import atan2, hypot, radians
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium import arc
 from echotruth.imaging.medium.anatomy import RIGHT_ATRIUM, Anatomy
-from echotruth.imaging.medium.annulus import Ring
-from echotruth.imaging.medium.body import CavityBody, Scene
+from echotruth.imaging.medium.annulus import box_of
+from echotruth.imaging.medium.body import Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
+from echotruth.imaging.medium.chamber_valve import AZIMUTH, ChamberLeaflets, ChamberValve
 from echotruth.imaging.medium.filling import course, opening
-from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
 APICAL = 0.15
 """Distance of the annulus below the base, in R."""
@@ -35,17 +34,10 @@ TENTING, TURN, OPEN = 0.15, radians(25), radians(80)
 to edge when shut; and their angle below the annulus when open, rad."""
 THICKNESS = 0.06
 """Over the radius of the annulus: 1 mm in the human preset."""
-POINTS = 12
-"""Of the annulus, by which its motion is known."""
 
 
-class TricuspidValve:
+class TricuspidValve(ChamberValve):
     """Where the leaflets are.
-
-    Attributes
-    ----------
-    opening : ndarray of shape (frame,)
-        As of :func:`echotruth.imaging.medium.filling.opening`.
 
     Parameters
     ----------
@@ -54,29 +46,20 @@ class TricuspidValve:
         As of :class:`echotruth.imaging.medium.body.Scene`.
     """
 
+    shut, turn, open_ = atan2(TENTING, 0.5), TURN, OPEN
+
     def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
-        self.opening, anatomy = course(opening, heart, between), Anatomy(heart)
+        anatomy, angle = Anatomy(heart), AZIMUTH + RIGHT_ATRIUM
         distance, radius = anatomy.right_atrium
-        self._azimuth = np.linspace(0, 2 * pi, POINTS, endpoint=False)
-        angle = self._azimuth + RIGHT_ATRIUM
         middle = distance * np.array([np.cos(RIGHT_ATRIUM), np.sin(RIGHT_ATRIUM), 0.0])
         around = radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
         points = anatomy.base + middle + around - [0, 0, APICAL * anatomy.radius]
-        # With the base, as the atrium does; a decay length has no part in that.
-        self._motion = SurroundingsMotion(heart, points, 1.0, np.full(POINTS, TissueLabel.RIGHT_ATRIUM, np.uint8))
-
-    def ring(self, frame: int) -> Ring:
-        """The tricuspid annulus in a frame: its first axis is away from the left ventricle."""
-        points = self._motion(frame)
-        area = np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
-        return Ring.of(points, self._azimuth, area / np.linalg.norm(area))
+        super().__init__(heart, points, TissueLabel.RIGHT_ATRIUM, course(opening, heart, between))
 
     @property
     def box(self) -> tuple[Floats, Floats]:
         """Lowest and highest coordinates, (3,), m, in the heart frame, that the leaflets reach in any frame."""
-        rings = [self.ring(frame) for frame in range(len(self.opening))]
-        middles, reach = np.stack([ring.middle for ring in rings]), 2 * max(ring.radius for ring in rings)
-        return middles.min(axis=0) - reach, middles.max(axis=0) + reach
+        return box_of(self.rings, np.array([-1.1, -1.1, -2 * _length() - 0.1]), np.array([1.1, 1.1, 0.1]))
 
     def leaflet(self, frame: int, side: Floats, across: Floats, share: Floats) -> Floats:
         """Points of the leaflets in a frame, (n, 3), m.
@@ -85,7 +68,7 @@ class TricuspidValve:
         both sides, over the radius of the annulus, and at shares (n,) of the length from the annulus.
         """
         half = np.sqrt(np.maximum(1 - across**2, 0))
-        inward, down = 2 * half * _length() * arc.points(*self._angles(frame), share).T
+        inward, down = 2 * half * _length() * arc.points(*self.angles(frame), share).T
         return self.ring(frame).to_heart(np.column_stack([side * (half - inward), across, -down]))
 
     def contains(self, frame: int, position: Floats) -> NDArray[np.bool_]:
@@ -96,19 +79,13 @@ class TricuspidValve:
         inside = np.zeros(len(position), bool)
         for side in (-1, 1):
             profile = np.column_stack([half - side * outward, -up]) / size[:, None]
-            share, normal = arc.inverse(*self._angles(frame), profile)
+            share, normal = arc.inverse(*self.angles(frame), profile)
             inside |= (share > 0) & (share < 1) & (np.abs(normal) * size < THICKNESS / 2)
         return inside & (np.abs(across) < 1)
 
-    def _angles(self, frame: int) -> tuple[float, float]:
-        """Angles of a leaflet below the annulus at base and edge in a frame, rad."""
-        share, middle = float(self.opening[frame]), atan2(TENTING, 0.5)
-        first, last = middle - TURN / 2, middle + TURN / 2
-        return first + (OPEN - first) * share, last + (OPEN - last) * share
-
 
 @dataclass(frozen=True, eq=False)
-class TricuspidLeaflets(CavityBody):
+class TricuspidLeaflets(ChamberLeaflets):
     """Scatterers of the tricuspid valve.
 
     Attributes
@@ -118,14 +95,9 @@ class TricuspidLeaflets(CavityBody):
     amplitude : ndarray of shape (n,)
     """
 
-    name, level = "tricuspid_leaflets", "neighbours.leaflets_dB"
+    name = "tricuspid_leaflets"
     place: Floats
     amplitude: Floats
-
-    @classmethod
-    def level_dB(cls, config: Config) -> Any:
-        """As of the mitral leaflets, if there are chambers, between two of which the valve is."""
-        return None if config.realism.neighbours.chambers_dB is None else super().level_dB(config)
 
     @classmethod
     def seed(cls, scene: Scene) -> Self:
