@@ -19,7 +19,7 @@ PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text
 
 LIGHT = f"""
 import sys
-for name in {MAKE!r}:
+for name in {(*MAKE, "onnxruntime")!r}:
     sys.modules[name] = None
 """
 
@@ -51,6 +51,7 @@ NEEDED = {
     "track clip.npz --wall wall.csv --view mid --spacing-mm 1 --frame-time-ms 1": "matplotlib",
     "export sample --format mp4 -o mp4": "imageio_ffmpeg",
     "evaluate copy --tracker dis --name mine --case healthy --view mid": "cv2",
+    "evaluate copy --onnx a.onnx": "onnxruntime",
 }
 """Command to the first package that it lacks."""
 
@@ -79,10 +80,12 @@ def test_light_installation_reads_loads_and_scores(tmp_path):
 def test_command_that_needs_more_says_which_extra_in_one_line(tmp_path):
     shutil.copytree(et.sample().folder, tmp_path / "copy")
     (tmp_path / "wall.csv").touch()
+    (tmp_path / "a.onnx").touch()
     np.savez(tmp_path / "clip.npz", image=np.zeros((4, 8, 8)))
     done = light(COMMANDS, tmp_path)
     said = [f"echotruth: {command.split()[0]} {WHOLE.format(package)}" for command, package in NEEDED.items()]
-    said[-1] = f"echotruth: the tracker dis {WHOLE.format('cv2')}"
+    said[-2] = f"echotruth: the tracker dis {WHOLE.format('cv2')}"
+    said[-1] = "echotruth: a.onnx needs the package onnxruntime: pip install 'echotruth[onnx]'"
     assert (done.returncode, done.stderr.splitlines()) == (0, said)
 
 

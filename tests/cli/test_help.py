@@ -61,7 +61,7 @@ def test_command_alone_prints_what_there_is(call):
             "--cores: is not an option of echotruth check: see echotruth check --help",
         ),
         (["check", "a.yaml", "b.yaml"], "b.yaml: is one argument too many"),
-        (["evaluate", "out/demo", "--trakcer=dis"], "one of the arguments --tracker --command is required"),
+        (["evaluate", "out/demo", "--trakcer=dis"], "one of the arguments --tracker --onnx --command is required"),
         (["export", "out/demo", "--format", "mp5"], "--format = mp5: did you mean mp4?"),
         (["export", "out/demo", "--format", "mp4", "--rate", "fast"], "argument --rate: invalid float value: 'fast'"),
         (["evaluate", "out/demo", "--tracker", "dis", "--size", "5.1"], "argument --size: invalid int value: '5.1'"),

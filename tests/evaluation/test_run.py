@@ -318,7 +318,12 @@ REFUSED = {
     "path": (["--tracker", "code/own.py:track"], "write package.module:function (dots, no path, no .py)"),
     "method": (["--tracker", "bspline"], "--tracker bspline: is not a tracker: did you mean bspline_dic?"),
     "dot": (["--tracker", "custom.exact"], "custom.exact: is not a tracker: write package.module:function"),
-    "nothing": (["--tracker", "zzzzzz"], "write package.module:function, or use one of phase_correlation, "),
+    "nothing": (
+        ["--tracker", "zzzzzz"],
+        "write package.module:function or MODEL.onnx, or use one of phase_correlation, ",
+    ),
+    "model": (["--onnx", "none.onnx"], "none.onnx: is not there: give the path of a model in ONNX"),
+    "option of a model": (["--onnx", "none.onnx", "--option", "side=3"], "side is not a key of the method onnx"),
     "module": (
         ["--tracker", "custon:exact"],
         "cannot be imported: ModuleNotFoundError: No module named 'custon'",

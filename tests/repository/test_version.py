@@ -135,12 +135,20 @@ def test_setting_changes_the_versions_of_the_stages_that_depend_on_it_and_no_oth
         assert version_of("bmode", before, "mid") != version_of("bmode", before, "long_axis")
 
 
-def test_file_that_the_command_of_a_tracker_names_changes_its_tracking_alone(tmp_path):
+@pytest.mark.parametrize(
+    ("file", "tracker"),
+    [
+        ("program.py", {"method": "external", "command": ["python", "program.py", "{input}", "{output}"]}),
+        ("model.onnx", {"method": "onnx", "model": "model.onnx"}),
+        ("model.yaml", {"method": "onnx", "model": "model.onnx"}),
+        ("model.onnx.data", {"method": "onnx", "model": "model.onnx"}),
+    ],
+)
+def test_file_that_a_tracker_names_changes_its_tracking_alone(tmp_path, file, tracker):
     def versions(text):
-        program = tmp_path / text / "program.py"
+        program = tmp_path / text / file
         program.parent.mkdir()
         program.write_text(text)
-        tracker = {"method": "external", "command": ["python", "program.py", "{input}", "{output}"]}
         with chdir(program.parent):
             config = configured(tracking={"trackers": {"own": tracker}})
             return {stage: version_of(stage, config, "mid") for stage in BEFORE if stage != "inference"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.config.tracking import METHODS, External, PhaseCorrelation, name_of
+from echotruth.config.tracking import METHODS, OUTSIDE, PhaseCorrelation, name_of
 from echotruth.tracking import track
 
 SPACING = 3e-5
@@ -13,7 +13,7 @@ CORRECTED = {"window_px": 48, "taper": "hann", "reference": "previous"}
 """Options that phase correlation needs for motion that varies in space."""
 
 
-@pytest.fixture(params=[method for method in METHODS if method is not External], ids=name_of)
+@pytest.fixture(params=[method for method in METHODS if method not in OUTSIDE], ids=name_of)
 def tracker(request):
     return request.param(**CORRECTED if request.param is PhaseCorrelation else {})
 

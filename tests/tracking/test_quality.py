@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from echotruth.config.tracking import METHODS, Dis, External, PhaseCorrelation
+from echotruth.config.tracking import METHODS, OUTSIDE, Dis, PhaseCorrelation
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.quality import ERRORS, ErrorModel, error_model, within
 
@@ -64,7 +64,7 @@ def test_lost_point_has_no_quality():
 
 def test_every_method_of_ours_has_a_fitted_distribution():
     for section in METHODS:
-        if section is not External:
+        if section not in OUTSIDE:
             assert error_model(section()) in ERRORS.values()
     assert error_model(PhaseCorrelation(reference="ED")) is not error_model(PhaseCorrelation(reference="previous"))
     assert error_model(Dis(preset="fine")) is not error_model(Dis(preset="fast"))

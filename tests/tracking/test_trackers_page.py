@@ -11,15 +11,15 @@ import pytest
 import yaml
 
 from echotruth.config import Config
-from echotruth.config.loading import validate
-from echotruth.config.tracking import TRACKER_ARGUMENTS, External
+from echotruth.config.loading import checked, validate
+from echotruth.config.tracking import TRACKER_ARGUMENTS, External, OnnxSignature
 from echotruth.tracking import track
 from echotruth.tracking.trackers.external import ENTRY_POINT_GROUP
 
 PAGE = (Path(__file__).parents[2] / "docs/trackers.md").read_text()
 TRACKER, PROGRAM, FLOW = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 (PACKAGE,) = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
-(CONFIGURATION,) = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
+CONFIGURATION, DECLARATION = re.findall(r"```yaml\n(.*?)```", PAGE, re.DOTALL)
 SHIFT = np.array([1.3, -0.6])
 """Motion of the speckle from frame to frame: lateral, axial, px."""
 
@@ -56,9 +56,9 @@ def test_program_of_the_page_runs(speckle):
     assert displacement.shape == (5, len(speckle[1]), 2) and not displacement.any()
 
 
-def test_table_of_the_page_is_in_the_order_of_the_arguments():
+def test_tables_of_the_page_are_in_the_order_of_the_arguments_and_of_the_keys():
     rows = re.findall(r"^\| `(\w+)` \|", PAGE, re.MULTILINE)
-    assert tuple(rows) == (*TRACKER_ARGUMENTS, "displacement", "quality")
+    assert tuple(rows) == (*TRACKER_ARGUMENTS, "displacement", "quality", *OnnxSignature.model_fields)
     scope = {}
     exec(TRACKER, scope)
     assert tuple(inspect.signature(scope["track"]).parameters) == (*TRACKER_ARGUMENTS, "window_mm")
@@ -67,4 +67,10 @@ def test_table_of_the_page_is_in_the_order_of_the_arguments():
 def test_configuration_and_entry_point_of_the_page_are_valid():
     config = validate(yaml.safe_load(CONFIGURATION), "docs/trackers.md")
     assert isinstance(config, Config) and isinstance(config.tracking.trackers["network"], External)
+    assert config.tracking.trackers["learned"].model == "model.onnx"
     assert list(tomllib.loads(PACKAGE)["project"]["entry-points"]) == [ENTRY_POINT_GROUP]
+
+
+def test_declaration_of_the_page_is_the_example_and_valid():
+    assert (Path(__file__).parents[2] / "examples/myotracker.yaml").read_text() == DECLARATION
+    assert checked(yaml.safe_load(DECLARATION), "myotracker.yaml", OnnxSignature).coordinates == "row_column"

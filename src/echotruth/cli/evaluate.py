@@ -11,6 +11,8 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
     tracker = parser.add_mutually_exclusive_group(required=True)
     tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method such as dis")
+    text = "a point tracker in ONNX, such as model.onnx (what it takes: model.yaml)"
+    tracker.add_argument("--onnx", dest="tracker", metavar="MODEL", help=text)
     # `arguments.command` is the name of the subcommand.
     tracker.add_argument("--command", dest="program", help='a program, such as "track {input} {output}"')
     parser.add_argument("--timeout", type=float, help="longest time of the program per clip, s (default: 3600)")
@@ -40,6 +42,7 @@ def evaluate(arguments: argparse.Namespace) -> int:
     examples:
       echotruth evaluate out/demo --tracker mypackage.module:track
       echotruth evaluate out/demo --tracker dis --option preset=fast
+      echotruth evaluate out/demo --onnx model.onnx
       echotruth evaluate out/demo --command "track {input} {output}" --name mine
 
     exit status:

@@ -30,7 +30,10 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--wall", type=Path, help=text)
     parser.add_argument("--view", help=f"{VIEWS} (default: what the .csv says)")
     text = f"{', '.join(TRACKERS)}, or package.module:function (default: bspline_dic)"
-    parser.add_argument("--tracker", default="bspline_dic", help=text)
+    tracker = parser.add_mutually_exclusive_group()
+    tracker.add_argument("--tracker", default="bspline_dic", help=text)
+    text = "in place of a tracker: a point tracker in ONNX, such as model.onnx (what it takes: model.yaml)"
+    tracker.add_argument("--onnx", dest="tracker", metavar="MODEL", help=text)
     parser.add_argument("-o", "--output", type=Path, default=Path("strain"), help="folder (default: strain)")
 
 
@@ -76,8 +79,8 @@ def _check_options(arguments: argparse.Namespace) -> None:
     clips, tracker = len(arguments.clip), arguments.tracker
     if arguments.wall and clips > 1:
         raise EchoError(f"--wall {arguments.wall}: suits one clip: name those of {clips} clips CLIP.wall.csv")
-    if ":" not in tracker and tracker not in TRACKERS:
-        otherwise = f"use one of {', '.join(TRACKERS)}, or package.module:function"
+    if not (":" in tracker or tracker.endswith(".onnx") or tracker in TRACKERS):
+        otherwise = f"use one of {', '.join(TRACKERS)}, package.module:function or MODEL.onnx"
         raise EchoError(f"--tracker {tracker}: {did_you_mean(tracker, TRACKERS, otherwise)}")
 
 

@@ -78,7 +78,7 @@ def tracker_section(config: Config, tracker: str | Callable[..., Any], options: 
     config : Config
         Its trackers are known by name, and its field of view scales the default lengths of methods.
     tracker : str or callable
-        Name of one of them, of a method, or `package.module:function`; or a function.
+        Name of one of them, of a method, `package.module:function`, or the file of a model in ONNX; or a function.
     options : dict
         Keys of the section, or keyword arguments of the function.
 
@@ -96,6 +96,8 @@ def tracker_section(config: Config, tracker: str | Callable[..., Any], options: 
     known = config.tracking.trackers
     if tracker in known:
         given = known[tracker].model_dump() | options
+    elif tracker.endswith(".onnx"):
+        given = {"method": "onnx", "model": tracker, **options}
     elif ":" in tracker:
         given = {"method": "external", "track": tracker, "options": options}
     else:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
-from typing import Any, get_origin
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -15,7 +15,9 @@ from echotruth.config.reading import MAX_ERRORS, ConfigError, check_size, joined
 from echotruth.config.sections import Config
 from echotruth.section import Section, discriminator, section_in, variants
 
-__all__ = ["ConfigError", "beside", "load", "override", "read_yaml", "validate"]
+Checked = TypeVar("Checked", bound=Section)
+
+__all__ = ["ConfigError", "beside", "checked", "load", "override", "read_yaml", "validate"]
 
 
 def load(path: str | Path) -> Config:
@@ -54,13 +56,18 @@ def _table(values: dict[str, Any]) -> str | None:
 
 def validate(values: dict[str, Any], source: str) -> Config:
     """Check the values of a configuration; errors name their `source`."""
+    return checked(values, source, Config)
+
+
+def checked(values: dict[str, Any], source: str, section: type[Checked]) -> Checked:
+    """Check the values of a section that has a file of its own, as :func:`validate` does."""
     if isinstance(values, dict):
         check_size(values, source)
     try:
-        return Config.model_validate(_without_empty(values, Config))
+        return section.model_validate(_without_empty(values, section))
     except ValidationError as error:
         enough = _distinct(error.errors())[: 10 * MAX_ERRORS]
-        raise joined([f"{source}: {_message(each)}" for each in enough], source) from None
+        raise joined([f"{source}: {_message(each, section)}" for each in enough], source) from None
 
 
 def override(config: Config, changes: dict[str, Any], source: str = "cases") -> Config:
@@ -96,9 +103,9 @@ def _without_type(location: tuple[Any, ...]) -> list[Any]:
     return place if last in ("int", "str") and place and isinstance(place[-1], int) else list(location)
 
 
-def _message(error: ErrorDetails) -> str:
+def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
     kind, context, value = error["type"], error.get("ctx", {}), error["input"]
-    keys, model, sections = _locate([part for part in _without_type(error["loc"]) if part != "[key]"])
+    keys, model, sections = _locate([part for part in _without_type(error["loc"]) if part != "[key]"], root)
     if kind == "invalid":
         keys, value = [*keys, context["key"]], context["value"]
     dotted_key = shown_key(keys)
@@ -199,13 +206,12 @@ def _either(names: list[str]) -> str:
     return f"{', '.join(first)} or {last}" if first else last
 
 
-def _locate(location: list[Any]) -> tuple[list[Any], type[BaseModel], dict[str, type[Section]]]:
+def _locate(location: list[Any], model: type[BaseModel]) -> tuple[list[Any], type[BaseModel], dict[str, type[Section]]]:
     """Keys as the user writes them, the section that contains the last one, and the variants of that section.
 
     The location that pydantic reports also contains the name of the variant: between `material` and its key, or after
     the name of a tracker.
     """
-    model: type[BaseModel] = Config
     keys, sections = [], {}
     parts = iter(location)
     for part in parts:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from math import isfinite
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
@@ -172,6 +173,11 @@ class External(Section):
     options: Annotated[dict[str, Any], BeforeValidator(parse_numbers)] = Field(default={})
     """Keyword arguments of the callable, or entries of the program's .npz; text such as 1e-3 is a number."""
 
+    @property
+    def files(self) -> list[str]:
+        """What may be files on which the result depends: the words of the command."""
+        return self.command or []
+
     @check
     def _track_or_command(self) -> None:
         self.require((self.track is None) != (self.command is None), "track", "give either track or command")
@@ -225,7 +231,45 @@ def _is_array(value: Any) -> bool:
     return all(isinstance(item, float) or (isinstance(item, int) and abs(item) < 2**63) for item in values)
 
 
-METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, External)
+class OnnxSignature(Section):
+    """What a model in ONNX takes and gives, as the file beside it declares it (docs/trackers.md lists the keys)."""
+
+    # T frames of H rows and W columns, N points, and the sizes of other axes: batch, channels and coordinates.
+    frames: Literal["THW", "T1HW", "T3HW", "THW1", "THW3", "1THW", "1T1HW", "1T3HW", "1THW1", "1THW3"] | None = None
+    points: Literal["N2", "1N2", "N3", "1N3"] | None = None
+    tracks: Literal["TN2", "NT2", "1TN2", "1NT2"] | None = None
+    coordinates: Literal["xy", "row_column"] = "xy"
+    unit: Literal["px", "normalised"] = "px"
+    values: Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)] | None = None
+    inputs: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    outputs: Annotated[list[str], Field(min_length=1, max_length=2)] | None = None
+    side_px: Annotated[int, Field(ge=1, le=65_536)] | None = None
+    frames_per_call: Annotated[int, Field(ge=2)] | None = None
+    points_per_call: Annotated[int, Field(ge=1)] | None = None
+
+
+class Onnx(Section):
+    """A learned point tracker in ONNX, which ONNX Runtime runs on one core."""
+
+    method: Literal["onnx"] = "onnx"
+    """Name of the method."""
+    model: Annotated[str, Field(min_length=1)]
+    """File of the model. What its graph does not tell is declared in a file beside it of the same name with the ending
+    .yaml (docs/trackers.md)."""
+
+    @property
+    def files(self) -> list[str]:
+        """The model, its signature, and the weights that PyTorch saves beside a large one."""
+        return [self.model, str(Path(self.model).with_suffix(".yaml")), f"{self.model}.data"]
+
+
+OUTSIDE = (External, Onnx)
+"""Sections of trackers from outside the package."""
+
+METHODS: tuple[type[Section], ...] = (
+    *(PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk),
+    *OUTSIDE,
+)
 """Sections of all methods of tracking."""
 
 DEFAULT = "phase_correlation"

@@ -7,11 +7,12 @@ from contextlib import redirect_stdout
 from difflib import get_close_matches
 from importlib.metadata import entry_points
 
-from echotruth.config.tracking import TRACKER_ARGUMENTS, External
+from echotruth.config.tracking import TRACKER_ARGUMENTS, External, Onnx
 from echotruth.evaluation.tracker_options import BUILTIN, EvaluationError
 from echotruth.section import Section
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.trackers.external import ENTRY_POINT_GROUP, load_callable
+from echotruth.tracking.trackers.onnx import Model
 
 
 def check_name(tracker: str) -> None:
@@ -20,7 +21,7 @@ def check_name(tracker: str) -> None:
     Parameters
     ----------
     tracker : str
-        A method of echotruth, `package.module:function`, or an entry point.
+        A method of echotruth, `package.module:function`, an entry point, or the file of a model in ONNX.
 
     Raises
     ------
@@ -28,15 +29,15 @@ def check_name(tracker: str) -> None:
         With what was probably meant.
     """
     known = [*BUILTIN, *entry_points(group=ENTRY_POINT_GROUP).names]
-    if tracker in known or ":" in tracker:
+    if tracker in known or ":" in tracker or tracker.endswith(".onnx"):
         return
     close = get_close_matches(tracker.lower(), known, n=1)
-    remedy = f"write package.module:function, or use one of {', '.join(known)}"
+    remedy = f"write package.module:function or MODEL.onnx, or use one of {', '.join(known)}"
     raise EvaluationError(f"--tracker {tracker}: is not a tracker: {f'did you mean {close[0]}?' if close else remedy}")
 
 
 def check_runs(settings: Section) -> None:
-    """Check that an external tracker can be imported and takes its options, or that its program is there.
+    """Check that an external tracker can be imported and takes its options, or that its program or model is there.
 
     Parameters
     ----------
@@ -45,9 +46,11 @@ def check_runs(settings: Section) -> None:
 
     Raises
     ------
-    EvaluationError
+    EvaluationError, TrackerFailed, ConfigError
         With what is wrong.
     """
+    if isinstance(settings, Onnx):
+        Model(settings)
     if not isinstance(settings, External):
         return
     if settings.command is not None:

@@ -7,9 +7,9 @@ from typing import Any
 
 import yaml
 
-from echotruth.config.tracking import METHODS, External, name_of, parse_numbers
+from echotruth.config.tracking import METHODS, OUTSIDE, name_of, parse_numbers
 
-BUILTIN = tuple(name_of(method) for method in METHODS if method is not External)
+BUILTIN = tuple(name_of(method) for method in METHODS if method not in OUTSIDE)
 """Names of the tracking methods of echotruth."""
 
 SCRIPTS = (".py", ".jl", ".m", ".r", ".sh", ".pl", ".js", ".lua")
@@ -28,7 +28,7 @@ def parse_tracker(
     Parameters
     ----------
     tracker : str or None
-        A method of echotruth, `package.module:function`, or an entry point.
+        A method of echotruth, `package.module:function`, an entry point, or the file of a model in ONNX.
     command : str or None
         If there is no `tracker`: a program and its arguments, as a shell splits them.
     options : list of str
@@ -53,6 +53,8 @@ def parse_tracker(
         limit = {} if timeout is None else {"timeout_s": timeout}
         script = next((word for word in words if Path(word).suffix.lower() in SCRIPTS), (words or [""])[0])
         return _identifier(Path(script).stem), {"method": "external", "command": words, "options": pairs, **limit}
+    if tracker.endswith(".onnx"):
+        return _identifier(Path(tracker).stem), {"method": "onnx", "model": tracker, **pairs}
     if tracker in BUILTIN:
         return tracker, {"method": tracker, **pairs}
     return _identifier(tracker.removesuffix(":track")), {"method": "external", "track": tracker, "options": pairs}

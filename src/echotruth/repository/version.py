@@ -31,6 +31,7 @@ PACKAGES = (
     "vtk",
     "xarray",
     "zarr",
+    "onnxruntime",
 )
 """Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 
@@ -184,8 +185,8 @@ def _bmode(config: Config, view: str) -> Settings:
 
 
 def _tracking(config: Config, view: str) -> Settings:
-    """What trackers find in a view: also what the files hold that the command of a tracker names."""
-    words = [word for tracker in config.tracking.trackers.values() for word in getattr(tracker, "command", None) or []]
+    """What trackers find in a view: also what the files hold that a tracker from outside names."""
+    words = [word for tracker in config.tracking.trackers.values() for word in getattr(tracker, "files", [])]
     return config.seed, config.tracking, [_content_of(Path(word)) for word in words if Path(word).is_file()]
 
 

@@ -2,7 +2,6 @@
 
 from math import log
 
-import cv2
 import numpy as np
 
 MIN_GAIN_DB = -30.0
@@ -85,6 +84,8 @@ def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.nda
     ndarray of the same shape and type
         The amplitudes as they are if `typical` is 0.
     """
+    import cv2  # whoever brings a tracker needs none
+
     if not typical > 0:
         return amplitude
     size = amplitude.shape[::-1]
@@ -123,6 +124,8 @@ def local_ncc(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
     ndarray of shape (axial, lateral)
         From -1 to 1; NaN where the square has no texture in either image, or contains a pixel without a value.
     """
+    import cv2
+
     known = np.isfinite(first) & np.isfinite(second)
     a, b = (np.where(known, image, 0).astype(float) for image in (first, second))
     # OpenCV takes running sums, whose rounding depends on where a thread begins.

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from echotruth.config.tracking import OUTSIDE
 from echotruth.extras import explained
 from echotruth.section import Section
 from echotruth.tracking import trackers
@@ -75,8 +76,8 @@ def track(
 
 def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality of the points of a clip, by a method of ours or from outside."""
-    if settings.method == "external":
-        return trackers.function("external")(clip, settings)
+    if isinstance(settings, OUTSIDE):
+        return trackers.function(settings.method)(clip, settings)
     with explained(f"the tracker {settings.method}"):
         path = tracked_path(clip, settings)
     return path.displacement, error_model(settings).probability(path, clip.shape)
