@@ -220,6 +220,7 @@ def test_command_refuses_what_cannot_be(ring, tmp_path, monkeypatch, capsys):
         ([clip, "--view", "mid"], "one.wall.csv: is not there: draw the wall"),
         ([clip, "--view", "mid", "--wall", wall], "frame to frame: give --spacing-mm and --frame-time-ms\n"),
         ([clip, "--view", "mid", "--wall", wall, *scale, "--tracker", "diss"], "--tracker diss: did you mean dis?"),
+        ([clip, "--view", "mid", "--wall", wall, *scale, "--onnx", "none.onnx"], "none.onnx: is not there: give the"),
         ([clip, clip.with_name("two.npy"), "--view", "mid", "--wall", wall], "suits one clip"),
     ):
         status, told = run(monkeypatch, capsys, *arguments, "-o", tmp_path / "out")

@@ -368,3 +368,8 @@ def test_model_is_taken_where_a_tracker_is_named(tmp_path):
     hearts = et.sample()
     tracked = et.track(hearts.clip("healthy", "mid"), str(model))
     assert et.evaluate(tracked, hearts.heart("healthy"))["nrmse_percent"] == pytest.approx(100)
+    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    clip = et.read_clip(np.tile(flash(2, 128), (2, 1, 1)), spacing_mm=0.1, frame_time_ms=5)
+    strain = et.speckle_tracking(clip, et.Wall(64 + 20 * circle, 64 + 35 * circle, "mid"), str(model))
+    assert strain.attrs["gcs_percent"] == pytest.approx(0, abs=1e-3)
