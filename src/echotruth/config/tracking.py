@@ -266,10 +266,7 @@ class Onnx(Section):
 OUTSIDE = (External, Onnx)
 """Sections of trackers from outside the package."""
 
-METHODS: tuple[type[Section], ...] = (
-    *(PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk),
-    *OUTSIDE,
-)
+METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, *OUTSIDE)
 """Sections of all methods of tracking."""
 
 DEFAULT = "phase_correlation"

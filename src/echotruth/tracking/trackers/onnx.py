@@ -98,8 +98,8 @@ class Model:
         black, white = self.signature.values or ([0, 255] if of_bytes else [0, 1])
         found = self._run(black + (white - black) * video, places)
         shape, sizes = found[0].shape, {"T": len(video), "N": len(points)}
-        layout = self._layout("tracks", self.outputs[0], shape, sizes)[:-1]
-        tracks = _read(found[0], f"{layout}C", "TNC")[..., turned]
+        axes = (1, 0) if "NT" in self._layout("tracks", self.outputs[0], shape, sizes) else (0, 1)
+        tracks = found[0].reshape(shape[-3:]).transpose(*axes, 2)[..., turned]
         tracks = tracks * side - 0.5 if is_normalised else tracks
         if (start := np.median(np.hypot(*(tracks[0] - points).T))) > LARGEST_START * side.max():
             remedy = f"give the tracks, coordinates and unit in {self.beside}"
@@ -109,12 +109,11 @@ class Model:
             told = f"has the shape {visible.shape}, and is {visible.min():.3g} to {visible.max():.3g}"
             remedy = f"a visibility has the shape {shape[:-1]}, and is 0 to 1"
             raise TrackerFailed(f"{self.path}: {self.outputs[1]} {told}: {remedy}")
-        return tracks, _read(visible.reshape(shape[:-1]), layout, "TN")
+        return tracks, visible.reshape(shape[-3:-1]).transpose(axes)
 
     def _run(self, video: Floats, places: Floats) -> list[np.ndarray]:
         """Outputs, which are finite, of a call with values and coordinates of the model."""
-        points = f"{self.layouts['points'][:-1]}C"
-        arrays = {"frames": (video, "THW", self.layouts["frames"]), "points": (places, "NC", points)}
+        arrays = {"frames": (video, self.layouts["frames"]), "points": (places, self.layouts["points"][:-1])}
         try:
             given = {node.name: _given(node, *arrays[key]) for key, node in self.inputs.items()}
             found = [np.asarray(array, float) for array in self.session.run(self.outputs, given)]
@@ -162,18 +161,10 @@ def _session(path: Path) -> Any:
         raise TrackerFailed(f"{path}: is no model that ONNX Runtime can load: {in_one_line(str(error))}") from error
 
 
-def _given(node: Any, array: Floats, axes: str, layout: str) -> np.ndarray:
-    """An array with these axes in the layout and type of an input; it is repeated along axes that are numbers."""
-    array = array.transpose([axes.index(axis) for axis in layout if axis in axes])
+def _given(node: Any, array: Floats, layout: str) -> np.ndarray:
+    """An array in the layout and type of an input; it is repeated along axes that are numbers."""
     for place, axis in enumerate(layout):
-        array = array if axis in axes else np.expand_dims(array, place).repeat(int(axis), axis=place)
+        array = np.expand_dims(array, place).repeat(int(axis), axis=place) if axis.isdigit() else array
     name = node.type.removeprefix("tensor(").removesuffix(")")
     kind = np.dtype({"float": "float32", "double": "float64"}.get(name, name))
     return np.ascontiguousarray(array if kind.kind == "f" else np.rint(array), kind)
-
-
-def _read(array: np.ndarray, layout: str, axes: str) -> Floats:
-    """An array in a layout as one with these axes."""
-    kept = "".join(axis for axis in layout if axis in axes)
-    batch = tuple(place for place, axis in enumerate(layout) if axis not in axes)
-    return array.squeeze(batch).transpose([kept.index(axis) for axis in axes])
