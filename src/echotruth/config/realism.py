@@ -105,6 +105,14 @@ class Haze(Section):
     """Mean additional range of the repeated echoes, which is exponentially distributed."""
 
 
+class RingDown(Section):
+    """Sound that goes to and fro in the lens of the probe: bands near the array, the same in all frames."""
+
+    level_dB: Level | None = None
+    """Its brightest echo over the RMS of the echo of muscle at end-diastole, in the focused lines before gain; null for
+    none."""
+
+
 class Aberration(Section):
     """Aberration: tissue near the array delays what each element sends and receives. It is the same in all frames of a
     view; the beam is wider and has higher side lobes."""
@@ -179,6 +187,7 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
             "papillary_muscles_dB": 0.0,
         },
         "haze": {"max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
+        "ring_down": {"level_dB": 3.0},
     }
     return merged(preset, of_heart)
 
@@ -230,6 +239,8 @@ class Realism(Section):
     """Noise of the receiver."""
     haze: Haze = Haze()
     """Reverberation: near echoes are repeated later and out of focus."""
+    ring_down: RingDown = RingDown()
+    """Sound that goes to and fro in the lens of the probe."""
     aberration: Aberration = Aberration()
     """Aberration by tissue near the array."""
     shadow: Shadow = Shadow()
