@@ -4,6 +4,8 @@ scan from the array, lengths of trackers from the field of view.
 
 from typing import Any
 
+from echotruth.config.cases import POSES, poses
+from echotruth.config.imaging import VIEWS
 from echotruth.config.merging import merged, nested
 from echotruth.config.tracking import METHODS, PhaseCorrelation, default_trackers, name_of
 from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
@@ -147,7 +149,7 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     path = _value(values, "motion.file.path")
     if _value(values, "motion.kind") == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES):
         values = _filled(values, {"geometry.file": path})
-    return _with_lengths(values)
+    return _with_poses(_with_lengths(values))
 
 
 def _filled(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
@@ -226,6 +228,21 @@ def _with_lengths(values: dict[str, Any]) -> dict[str, Any]:
         return values
     scaled = {name: _lengths(t, scale) | t if isinstance(t, dict) else t for name, t in trackers.items()}
     return values | {"tracking": tracking | {"trackers": scaled}}
+
+
+def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
+    """Values with the distributions of the poses of all views, if a preset draws them and views and focus are valid."""
+    draw, given, focus = (_value(values, key) for key in ("cases.draw", "views", "rf.focus_mm"))
+    views = VIEWS["paper"] if given is None else given
+    if isinstance(views, dict) and isinstance(preset := views.get("preset"), str):
+        views = VIEWS.get(preset, {}) | {name: view for name, view in views.items() if name != "preset"}
+    valid = isinstance(draw, dict) and isinstance(draw.get("keys", {}), dict) and isinstance(views, dict)
+    if not valid or draw.get("preset") != "acoustics" or not isinstance(focus, int | float):
+        return values
+    known = {name: {key: _value({"view": view}, f"view.{key}") for key in POSES} for name, view in views.items()}
+    known = {name: {key: v for key, v in keys.items() if isinstance(v, int | float)} for name, keys in known.items()}
+    keys = poses(known, focus) | draw.get("keys", {})
+    return values | {"cases": values["cases"] | {"draw": draw | {"keys": keys}}}
 
 
 def _lengths(tracker: dict[str, Any], scale: float) -> dict[str, Any]:
