@@ -25,6 +25,15 @@ def test_tissues_of_the_surroundings_are_refused_without_them(name, tmp_path):
         load(file)
 
 
+def test_atria_that_would_be_at_rest_beside_moving_valves_are_refused(tmp_path):
+    file = tmp_path / "rest.yaml"
+    file.write_text("realism: {preset: mouse, surroundings: {motion_decay_mm: 0}}\n")
+    with pytest.raises(ConfigError, match=r"realism.surroundings.motion_decay_mm = 0.*must exceed 0 where there are"):
+        load(file)
+    file.write_text("realism: {preset: mouse, surroundings: {motion_decay_mm: 0}, neighbours: {chambers_dB: null}}\n")
+    assert load(file).realism.surroundings.motion_decay_mm == 0
+
+
 @pytest.mark.parametrize("other", ["phantom: {in_plane_only: true}", "geometry: {shape: tube}\nmotion: {kind: rigid}"])
 def test_bodies_in_the_cavity_are_refused_where_there_is_none(other, tmp_path):
     file = tmp_path / "open.yaml"

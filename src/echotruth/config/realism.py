@@ -54,7 +54,8 @@ class Surroundings(Tissue):
     start_mm: Positive = 2.0
     """Range from the array at which the tissue begins."""
     motion_decay_mm: Length = 1.0
-    """Distance from the epicardium over which its motion falls to 1/e of that of the epicardium; 0 for no motion."""
+    """Distance from the epicardium over which its motion falls to 1/e of that of the epicardium; 0 for no motion, which
+    leaves no room for `neighbours.chambers_dB`."""
 
 
 class Neighbours(Section):
