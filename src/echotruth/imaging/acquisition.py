@@ -8,6 +8,7 @@ from functools import cached_property
 from math import prod, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.config import Config, Probe
 from echotruth.imaging.beamforming.aperture import Aperture, harmonic
@@ -57,7 +58,7 @@ class Acquisition:
         snr = realism.noise.snr_dB
         self.noise = 0.0 if snr is None else self._signal_to_unit_noise() * 10 ** (-snr / 20)
         level = realism.ring_down.level_dB
-        self._ring_down = None if level is None else self._unit_ring_down(config.probe) * np.float32(10 ** (level / 20))
+        self._ring_down = None if level is None else self._leveled_ring_down(config.probe, level)
 
     def __call__(self, frame: int) -> np.ndarray:
         """Spectra of the record of all pairs in a frame, (bins, elements, elements), as from :class:`FullMatrix`."""
@@ -125,14 +126,15 @@ class Acquisition:
         noise = self._scanner.beamform(self.unit_noise(0))
         return float(np.linalg.norm(echo) / np.linalg.norm(noise[muscle]))
 
-    def _unit_ring_down(self, probe: Probe) -> np.ndarray:
-        """Ring-down, (bins, elements), whose brightest echo in the lines is the RMS of the echo of muscle."""
+    def _leveled_ring_down(self, probe: Probe, level_dB: float) -> NDArray[np.complex64]:
+        """Ring-down, (bins, elements), whose brightest echo in the lines is at a level over the RMS of muscle."""
         matrix, (_, echo) = self._scanner.matrix, self._muscle
         spectra = ring_down.ring_down(probe, matrix.frequency)
         record = np.zeros((len(spectra), *2 * spectra.shape[1:]), np.complex64)
         ring_down.add(record, spectra)
         brightest = np.abs(self._scanner.beamform(record)).max()
-        return spectra * np.float32(np.linalg.norm(echo) / np.sqrt(echo.size) / brightest)
+        scale = 10 ** (level_dB / 20) * np.linalg.norm(echo) / np.sqrt(echo.size) / brightest
+        return (spectra * scale).astype(np.complex64)
 
 
 def _screen(config: Config, frequency: np.ndarray, random: Random) -> tuple[np.ndarray, np.ndarray]:
