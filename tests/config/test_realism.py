@@ -25,6 +25,15 @@ def test_tissues_of_the_surroundings_are_refused_without_them(name, tmp_path):
         load(file)
 
 
+def test_atria_that_would_be_at_rest_beside_moving_valves_are_refused(tmp_path):
+    file = tmp_path / "rest.yaml"
+    file.write_text("realism: {preset: mouse, surroundings: {motion_decay_mm: 0}}\n")
+    with pytest.raises(ConfigError, match=r"realism.surroundings.motion_decay_mm = 0.*must exceed 0 where there are"):
+        load(file)
+    file.write_text("realism: {preset: mouse, surroundings: {motion_decay_mm: 0}, neighbours: {chambers_dB: null}}\n")
+    assert load(file).realism.surroundings.motion_decay_mm == 0
+
+
 @pytest.mark.parametrize("other", ["phantom: {in_plane_only: true}", "geometry: {shape: tube}\nmotion: {kind: rigid}"])
 def test_bodies_in_the_cavity_are_refused_where_there_is_none(other, tmp_path):
     file = tmp_path / "open.yaml"
@@ -91,3 +100,29 @@ def test_acoustics_are_drawn_by_one_key_and_given_ranges_take_precedence():
     # What is stored with a repository draws the same again.
     again = configure(config.model_dump())
     assert [case.id for case in expand(again)] == [case.id for case in expand(config)]
+
+
+@pytest.mark.parametrize("species", ["mouse", "human"])
+def test_acoustics_draw_the_pose_of_each_view(species):
+    views = {"preset": "echo", "mine": {"position": 0.4, "offset": {"lateral_mm": 0.1}}}
+    cases = {
+        "draw": {"number": 16, "preset": "acoustics", "keys": {"views.mid.motion.rocking_deg": {"uniform": [3, 4]}}}
+    }
+    config = configure(geometry={"preset": species}, realism={"preset": species}, views=views, cases=cases)
+    hearts = [case.config for case in expand(config)]
+    assert len({view.angle_deg for heart in hearts for view in heart.views.values()}) == 16 * 7
+    focus = config.rf.focus_mm
+    for name, view in config.views.items():
+        seen = [heart.views[name] for heart in hearts]
+        bounds = {
+            "angle": ([each.angle_deg - view.angle_deg for each in seen], 10),
+            "lateral": ([each.offset.lateral_mm - view.offset.lateral_mm for each in seen], 0.08 * focus),
+            "drift": ([each.motion.drift.elevation_mm for each in seen], 0.015 * focus),
+        }
+        for values, bound in bounds.values():
+            assert 0.8 * bound < max(map(abs, values)) <= bound + 1e-6 and min(values) < 0 < max(values)
+        breaths = [each.motion.breathing.axial_mm for each in seen]
+        assert 0 <= min(breaths) < max(breaths) <= 0.03 * focus + 1e-6
+    assert all(3 <= heart.views["mid"].motion.rocking_deg <= 4 for heart in hearts)
+    # What is stored with a repository draws the same again.
+    assert [case.id for case in expand(configure(config.model_dump()))] == [case.id for case in expand(config)]

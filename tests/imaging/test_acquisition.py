@@ -1,4 +1,4 @@
-"""Shadow, haze and noise in the record of all pairs, against what each should do to it."""
+"""Shadow, haze, ring-down and noise in the record of all pairs, against what each should do to it."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ from echotruth.config import Config, Probe
 from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner
+from echotruth.imaging.rf import ring_down
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
 
@@ -179,3 +180,31 @@ def test_scatterers_before_the_rib_are_not_shaded_and_those_deep_behind_it_are(a
     for place, passes, error in ((before, 1.0, 0.01), (behind, 1e-4, 0.03)):
         echo = passes * scanner.matrix(place, one)
         assert np.linalg.norm(acquisition.echoes(place, one) - echo) < error * np.linalg.norm(echo)
+
+
+def test_ring_down_has_the_level_asked_for_and_is_the_same_in_all_frames(acquire, scanner):
+    acquisition, whole = acquire(ring_down={"level_dB": 6.0})
+    bare, _ = acquire()
+    bands = [scanner.beamform(acquisition(frame) - bare(frame)) for frame in (0, 1)]
+    muscle = whole.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
+    rms = np.sqrt(np.mean(np.abs(scanner.lines(*whole.wall(0))[muscle]) ** 2))
+    assert 20 * np.log10(np.abs(bands[0]).max() / rms) == pytest.approx(6.0, abs=0.01)
+    assert np.abs(bands[1] - bands[0]).max() < 1e-4 * np.abs(bands[0]).max()
+
+
+def test_ring_down_is_what_a_mirror_before_the_array_would_send_back(scanner):
+    # Straight ahead its bands are one thickness of the lens apart, and the first is the brightest at the middle.
+    spectra = ring_down.ring_down(Config.model_validate(SMALL).probe, scanner.matrix.frequency)
+    record = np.zeros((len(spectra), 16, 16), np.complex64)
+    ring_down.add(record, spectra)
+    assert np.array_equal(record, record.swapaxes(1, 2))
+    trace = np.fft.irfft(np.pad(spectra[:, 0], (scanner.matrix.first_bin, 0)), scanner.matrix.samples)
+    thickness = 12 * 1540 / 25e6
+    for trip in (1, 2, 3):
+        around = np.arange(len(trace)) / scanner.matrix.sampling * 1540 / 2 - trip * thickness
+        near = np.abs(around) < thickness / 2
+        assert abs(around[near][np.abs(trace[near]).argmax()]) < 1540 / 25e6 / 4
+    # Of elements that lie apart it comes later, over the path to their image in the mirror.
+    apart = np.fft.irfft(np.pad(spectra[:, 15], (scanner.matrix.first_bin, 0)), scanner.matrix.samples)
+    path = np.abs(apart).argmax() / scanner.matrix.sampling * 1540
+    assert path == pytest.approx(np.hypot(2 * thickness, 15 * 90e-6), abs=1540 / 25e6 / 2)

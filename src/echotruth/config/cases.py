@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 
+MAX_KEYS = 256
+"""Drawn keys at most, as columns of a table."""
 KINDS = ("uniform", "log_uniform", "normal", "integers", "choice")
 """Keys of a distribution of which one is given."""
 
@@ -98,6 +100,18 @@ ACOUSTICS: dict[str, dict[str, Any]] = {
     "bmode.dropout.edge_loss_dB": {"uniform": [0, 25]},
 }
 """Distributions of `cases.draw.preset: acoustics`; docs/realism.md says where each range is from."""
+POSES: dict[str, list[float]] = {
+    "angle_deg": [-10, 10],
+    "offset.lateral_mm": [-0.08, 0.08],
+    "offset.axial_mm": [-0.05, 0.05],
+    "motion.drift.lateral_mm": [-0.015, 0.015],
+    "motion.drift.elevation_mm": [-0.015, 0.015],
+    "motion.breathing.axial_mm": [0, 0.03],
+    "motion.breathing.phase_deg": [0, 360],
+    "motion.rocking_deg": [-1.5, 1.5],
+}
+"""Bounds of keys of every view that `cases.draw.preset: acoustics` draws uniformly, beside their value in the
+configuration; lengths over `rf.focus_mm`. docs/realism.md says where each range is from."""
 HEARTS: dict[str, dict[str, Any]] = {
     "geometry.scale": {"uniform": [0.88, 1.12]},
     "geometry.elongation": {"uniform": [0.88, 1.12]},
@@ -128,14 +142,15 @@ class Draw(Section):
     preset: Literal["none", "acoustics", "hearts"] = "none"
     """Keys that are drawn beside those in `keys`. `hearts`: size, shape, fibres, muscle, load and disease, over ranges
     in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`. `acoustics`: levels
-    of tissues, noise and artefacts, attenuation, gain and grey map, each over its published or chosen range
-    (docs/realism.md), so that the looks of a training set differ; use it with a `realism.preset`."""
+    of tissues, noise and artefacts, attenuation, gain and grey map, and the pose of each view (`angle_deg`,
+    `offset`, `motion`), each over its published or chosen range (docs/realism.md), so that the looks of a training set
+    differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
     """Number of hearts (of each row of the table and each combination of the grid). A larger number adds hearts, and
     those that were there stay; a power of 2 is the most even."""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     """Seed of the draws, points of Sobol's sequence; it is not that of the images."""
-    keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=64)]
+    keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=MAX_KEYS)]
     """Distribution of each dotted key; those given take precedence over those of `preset`."""
 
     @model_validator(mode="before")
@@ -145,6 +160,17 @@ class Draw(Section):
             return values
         preset: dict[str, Any] = DRAW_PRESETS.get(str(values.get("preset")), {})
         return values | {"keys": preset | keys} if preset else values
+
+
+def poses(views: dict[str, Any], focus_mm: float) -> dict[str, dict[str, Any]]:
+    """Distributions of the poses of views: name -> dotted key of a view -> its value where it is not drawn."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, view in views.items():
+        for key, about in POSES.items():
+            scale = focus_mm if key.endswith("_mm") else 1.0
+            bounds = [round(view.get(key, 0) + scale * bound, 6) for bound in about]
+            found[f"views.{name}.{key}"] = {"uniform": bounds}
+    return found
 
 
 def _as_list(value: Any) -> Any:

@@ -2,8 +2,10 @@
 scan from the array, lengths of trackers from the field of view.
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
+from echotruth.config.cases import POSES, poses
+from echotruth.config.imaging import VIEWS
 from echotruth.config.merging import merged, nested
 from echotruth.config.tracking import METHODS, PhaseCorrelation, default_trackers, name_of
 from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
@@ -81,12 +83,6 @@ DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
     ("dcm", "human"): {"loop.circulation.contractility": 0.7},
 }
 """`pathology.preset` and `geometry.preset` -> what differs from that."""
-REALISM_BANDWIDTHS = {"mouse": 0.6, "human": 0.15}
-"""`realism.preset` -> default of the bandwidth, and of the density of scatterers, of which a longer pulse needs fewer,
-over those of the array."""
-REALISM_HARMONIC = {"human": 1.25}
-"""`realism.preset` -> frequency at which harmonics are received, over that of the array, whose band must hold it and
-its half. Presets that are not here have no harmonic imaging."""
 REALISM_SMOOTHING = 1 / 260
 """Default of `bmode.smoothing_width_px` over the side of the image, with any `realism.preset`."""
 REALISM_IMAGE: dict[str, Any] = {
@@ -96,23 +92,48 @@ REALISM_IMAGE: dict[str, Any] = {
     "bmode.smoothing": 1.0,
 }
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_GAIN_DB = {"mouse": -13.0, "human": -9.5}
-"""`realism.preset` -> default of `bmode.gain_dB`."""
 REALISM_EDGE_LOSS_DB, REALISM_EDGE_DEG = 22.0, 85.0
 """Default of `bmode.dropout.edge_loss_dB` of a sector, with any `realism.preset`, and the opening angle of that sector;
 of others it is that of lines at the same angle."""
-REALISM_SCAN: dict[str, dict[str, float]] = {
-    "mouse": {},
-    "human": {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
+
+
+class Look(NamedTuple):
+    """Defaults of realistic images of a species that differ from those of another.
+
+    Attributes
+    ----------
+    bandwidth : float
+        Bandwidth, and density of scatterers, of which a longer pulse needs fewer, over those of the array.
+    gain_dB : float
+        `bmode.gain_dB`.
+    time_gain_dB : dict
+        `bmode.time_gain` by the range over the field of view of the array: with it, an even medium is as bright at any
+        range of the default array.
+    harmonic : float or None
+        Frequency at which harmonics are received, over that of the array, whose band must hold it and its half; none
+        without harmonic imaging.
+    scan : dict
+        Dotted keys whose defaults are so many times those of the array, so that the roof of the atria is seen.
+    """
+
+    bandwidth: float
+    gain_dB: float
+    time_gain_dB: dict[float, float]
+    harmonic: float | None
+    scan: dict[str, float]
+
+
+REALISM_LOOKS = {
+    "mouse": Look(0.6, -13.0, {0.1: 7, 0.17: 4, 0.23: 2, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9}, None, {}),
+    "human": Look(
+        0.15,
+        -9.5,
+        {0.1: 20, 0.17: 14, 0.23: 5.5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
+        1.25,
+        {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
+    ),
 }
-"""`realism.preset` -> dotted keys whose defaults are so many times those of the array, so that the roof of the atria is
-seen."""
-REALISM_TIME_GAIN_DB: dict[str, dict[float, float]] = {
-    "mouse": {0.1: 7, 0.17: 4, 0.23: 2, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9},
-    "human": {0.1: 20, 0.17: 14, 0.23: 5.5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
-}
-"""`realism.preset` -> default of `bmode.time_gain` by the range over the field of view of the array: with it, an even
-medium is as bright at any range of the default array."""
+"""By `realism.preset`; docs/realism.md says what they were fitted to."""
 
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""
@@ -147,7 +168,7 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     path = _value(values, "motion.file.path")
     if _value(values, "motion.kind") == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES):
         values = _filled(values, {"geometry.file": path})
-    return _with_lengths(values)
+    return _with_poses(_with_lengths(values))
 
 
 def _filled(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
@@ -169,29 +190,30 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     The density of scatterers suits that band; a bandwidth that is given leaves both as they are.
     """
     name, size = str(_value(values, "realism.preset")), _value(values, "bmode.size_px") or 512
-    if name not in REALISM_BANDWIDTHS:
+    look = REALISM_LOOKS.get(name)
+    if look is None:
         return {}
     width = REALISM_SMOOTHING * size if isinstance(size, int | float) else 2.0
-    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, name)
-    found |= {"bmode.gain_dB": REALISM_GAIN_DB[name]} | _scan(array, name)
+    found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, look)
+    found |= {"bmode.gain_dB": look.gain_dB} | _scan(array, look)
     if any(_value(values, f"bmode.time_gain.{key}") for key in ("range_mm", "gain_dB")):
         found = {key: value for key, value in found.items() if not key.startswith("bmode.time_gain")}
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
         return found
-    share, density, ratio = REALISM_BANDWIDTHS[name], "phantom.density_per_mm3", 1.0
-    if "probe.frequency_MHz" in found and _value(values, "probe.frequency_MHz") is None:
-        ratio = REALISM_HARMONIC[name]
+    density, ratio = "phantom.density_per_mm3", 1.0
+    if look.harmonic and "probe.frequency_MHz" in found and _value(values, "probe.frequency_MHz") is None:
+        ratio = look.harmonic
     # A resolution cell is so many wavelengths long, wide and thick.
-    number = round(share * ratio**3 * ARRAY_DEFAULTS[array][density], 3)
-    return found | {"probe.bandwidth": round(share * ARRAY_PRESETS[array]["bandwidth"], 3), density: number}
+    number = round(look.bandwidth * ratio**3 * ARRAY_DEFAULTS[array][density], 3)
+    return found | {"probe.bandwidth": round(look.bandwidth * ARRAY_PRESETS[array]["bandwidth"], 3), density: number}
 
 
-def _scan(array: str, realism: str) -> dict[str, Any]:
+def _scan(array: str, look: Look) -> dict[str, Any]:
     """Defaults of dotted keys of a scan that shows what a preset has, and of its gain over range."""
     if array not in ARRAY_DEFAULTS:
         return {}
-    default, gain = ARRAY_DEFAULTS[array], REALISM_TIME_GAIN_DB[realism]
-    scan = {key: round(share * default[key], 3) for key, share in REALISM_SCAN[realism].items()}
+    default, gain = ARRAY_DEFAULTS[array], look.time_gain_dB
+    scan = {key: round(share * default[key], 3) for key, share in look.scan.items()}
     if default.get("rf.scan") != "linear":
         sector = scan.get("rf.sector_deg", default["rf.sector_deg"])
         scan["bmode.dropout.edge_loss_dB"] = round(REALISM_EDGE_LOSS_DB * (sector / REALISM_EDGE_DEG) ** 2, 1)
@@ -202,14 +224,14 @@ def _scan(array: str, realism: str) -> dict[str, Any]:
     }
 
 
-def _harmonic(values: dict[str, Any], array: str, realism: str) -> dict[str, Any]:
+def _harmonic(values: dict[str, Any], array: str, look: Look) -> dict[str, Any]:
     """Defaults of dotted keys of harmonic imaging, unless it is not that of a preset, or is turned off."""
     unfocused = _value(values, "rf.transmit") not in (None, "focused")
-    if realism not in REALISM_HARMONIC or array not in ARRAY_PRESETS or unfocused:
+    if look.harmonic is None or array not in ARRAY_PRESETS or unfocused:
         return {}
     if _value(values, "rf.harmonic") is False:
         return {}
-    frequency = round(REALISM_HARMONIC[realism] * ARRAY_PRESETS[array]["frequency_MHz"], 3)
+    frequency = round(look.harmonic * ARRAY_PRESETS[array]["frequency_MHz"], 3)
     return {"rf.harmonic": True, "rf.transmit_apodization": "none", "probe.frequency_MHz": frequency}
 
 
@@ -226,6 +248,21 @@ def _with_lengths(values: dict[str, Any]) -> dict[str, Any]:
         return values
     scaled = {name: _lengths(t, scale) | t if isinstance(t, dict) else t for name, t in trackers.items()}
     return values | {"tracking": tracking | {"trackers": scaled}}
+
+
+def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
+    """Values with the distributions of the poses of all views, if a preset draws them and views and focus are valid."""
+    draw, given, focus = (_value(values, key) for key in ("cases.draw", "views", "rf.focus_mm"))
+    views = VIEWS["paper"] if given is None else given
+    if isinstance(views, dict) and isinstance(preset := views.get("preset"), str):
+        views = VIEWS.get(preset, {}) | {name: view for name, view in views.items() if name != "preset"}
+    valid = isinstance(draw, dict) and isinstance(draw.get("keys", {}), dict) and isinstance(views, dict)
+    if not valid or draw.get("preset") != "acoustics" or not isinstance(focus, int | float):
+        return values
+    known = {name: {key: _value({"view": view}, f"view.{key}") for key in POSES} for name, view in views.items()}
+    known = {name: {key: v for key, v in keys.items() if isinstance(v, int | float)} for name, keys in known.items()}
+    keys = poses(known, focus) | draw.get("keys", {})
+    return values | {"cases": values["cases"] | {"draw": draw | {"keys": keys}}}
 
 
 def _lengths(tracker: dict[str, Any], scale: float) -> dict[str, Any]:

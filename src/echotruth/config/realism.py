@@ -54,7 +54,8 @@ class Surroundings(Tissue):
     start_mm: Positive = 2.0
     """Range from the array at which the tissue begins."""
     motion_decay_mm: Length = 1.0
-    """Distance from the epicardium over which its motion falls to 1/e of that of the epicardium; 0 for no motion."""
+    """Distance from the epicardium over which its motion falls to 1/e of that of the epicardium; 0 for no motion, which
+    leaves no room for `neighbours.chambers_dB`."""
 
 
 class Neighbours(Section):
@@ -103,6 +104,14 @@ class Haze(Section):
     """Largest range of echoes that are repeated."""
     mean_extra_range_mm: Positive = 2.0
     """Mean additional range of the repeated echoes, which is exponentially distributed."""
+
+
+class RingDown(Section):
+    """Sound that goes to and fro in the lens of the probe: bands near the array, the same in all frames."""
+
+    level_dB: Level | None = None
+    """Its brightest echo over the RMS of the echo of muscle at end-diastole, in the focused lines before gain; null for
+    none."""
 
 
 class Aberration(Section):
@@ -179,6 +188,7 @@ def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any
             "papillary_muscles_dB": 0.0,
         },
         "haze": {"max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
+        "ring_down": {"level_dB": 3.0},
     }
     return merged(preset, of_heart)
 
@@ -230,6 +240,8 @@ class Realism(Section):
     """Noise of the receiver."""
     haze: Haze = Haze()
     """Reverberation: near echoes are repeated later and out of focus."""
+    ring_down: RingDown = RingDown()
+    """Sound that goes to and fro in the lens of the probe."""
     aberration: Aberration = Aberration()
     """Aberration by tissue near the array."""
     shadow: Shadow = Shadow()

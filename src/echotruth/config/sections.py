@@ -176,6 +176,11 @@ class Config(Section):
         remedy = "needs realism.surroundings.level_dB, the echo power of what lies between the neighbours"
         for name, level in self.realism.neighbours.around.items():
             self.require(level is None or surrounded, f"realism.neighbours.{name}", remedy)
+        follows = self.realism.surroundings.motion_decay_mm > 0 or self.realism.neighbours.chambers_dB is None
+        remedy = (
+            "must exceed 0 where there are realism.neighbours.chambers_dB, as they would be at rest beside the valves"
+        )
+        self.require(follows, "realism.surroundings.motion_decay_mm", remedy)
 
     @check
     def _check_width(self) -> None:

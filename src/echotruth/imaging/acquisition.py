@@ -1,19 +1,23 @@
-"""Acquisition: the full matrix of every frame, with growth of the harmonic, shadow, haze, aberration and noise.
+"""Acquisition: the full matrix of every frame, with growth of the harmonic, shadow, haze, aberration, ring-down and
+noise.
 
 Applied to the full matrix, so that every synthesised transmit contains them.
 """
 
+from functools import cached_property
 from math import prod, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
-from echotruth.config import Config
+from echotruth.config import Config, Probe
 from echotruth.imaging.beamforming.aperture import Aperture, harmonic
 from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner, validate_scatterers
 from echotruth.imaging.medium.body import Echoes
 from echotruth.imaging.medium.medium import Medium
 from echotruth.imaging.medium.random_process import Random
+from echotruth.imaging.rf import ring_down
 from echotruth.imaging.rf.aberration import delays, phasors
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
@@ -53,6 +57,8 @@ class Acquisition:
             self._matrix = scanner.matrix.behind(Rib(realism.shadow))
         snr = realism.noise.snr_dB
         self.noise = 0.0 if snr is None else self._signal_to_unit_noise() * 10 ** (-snr / 20)
+        level = realism.ring_down.level_dB
+        self._ring_down = None if level is None else self._leveled_ring_down(config.probe, level)
 
     def __call__(self, frame: int) -> np.ndarray:
         """Spectra of the record of all pairs in a frame, (bins, elements, elements), as from :class:`FullMatrix`."""
@@ -61,6 +67,8 @@ class Acquisition:
     def record(self, scatterers: Echoes, frame: int | str) -> np.ndarray:
         """Record of scatterers with the noise of a frame, or of what has another name."""
         record = self.echoes(*validate_scatterers(*scatterers))
+        if self._ring_down is not None:
+            ring_down.add(record, self._ring_down)
         if self.noise:
             record += np.float32(self.noise) * self.unit_noise(frame)
         return record
@@ -100,16 +108,33 @@ class Acquisition:
         scaled = (parts + np.float32(0.5)) * np.float32(1 / BYTE_STD / sqrt(2))
         return scaled.view(np.complex64).reshape(shape[:3])
 
-    def _signal_to_unit_noise(self) -> float:
-        """RMS of the echo of muscle over that of unit noise, in the lines where muscle is at end-diastole."""
+    @cached_property
+    def _muscle(self) -> tuple[np.ndarray, np.ndarray]:
+        """Where muscle is in the lines at end-diastole, (lines, ranges), bool, and its echo there."""
         scanner = self._scanner
         muscle = self._medium.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
         if not muscle.any():
-            raise ValueError("There is no muscle in the image at end-diastole, so realism.noise.snr_dB has no meaning.")
+            remedy = "so levels relative to it (realism.noise, realism.ring_down) have no meaning"
+            raise ValueError(f"There is no muscle in the image at end-diastole, {remedy}.")
         position, amplitude, exponent = validate_scatterers(*self._medium.wall(0))
         matrix = scanner.matrix(position, self._grown(position, amplitude), exponent)
-        echo, noise = scanner.beamform(self._aberrated(matrix)), scanner.beamform(self.unit_noise(0))
-        return float(np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle]))
+        return muscle, scanner.beamform(self._aberrated(matrix))[muscle]
+
+    def _signal_to_unit_noise(self) -> float:
+        """RMS of the echo of muscle over that of unit noise, in the lines where muscle is at end-diastole."""
+        muscle, echo = self._muscle
+        noise = self._scanner.beamform(self.unit_noise(0))
+        return float(np.linalg.norm(echo) / np.linalg.norm(noise[muscle]))
+
+    def _leveled_ring_down(self, probe: Probe, level_dB: float) -> NDArray[np.complex64]:
+        """Ring-down, (bins, elements), whose brightest echo in the lines is at a level over the RMS of muscle."""
+        matrix, (_, echo) = self._scanner.matrix, self._muscle
+        spectra = ring_down.ring_down(probe, matrix.frequency)
+        record = np.zeros((len(spectra), *2 * spectra.shape[1:]), np.complex64)
+        ring_down.add(record, spectra)
+        brightest = np.abs(self._scanner.beamform(record)).max()
+        scale = 10 ** (level_dB / 20) * np.linalg.norm(echo) / np.sqrt(echo.size) / brightest
+        return (spectra * scale).astype(np.complex64)
 
 
 def _screen(config: Config, frequency: np.ndarray, random: Random) -> tuple[np.ndarray, np.ndarray]:

@@ -52,10 +52,6 @@ def draw(cells: np.ndarray, nodes: np.ndarray, fibre: np.ndarray, helix: np.ndar
     strain : ndarray of shape (cell, 6)
         At end-systole since end-diastole.
     """
-    # In a sweep, hearts with fewer elements are padded with cells of one repeated node and NaN nodes.
-    real = cells.min(1) < cells.max(1)
-    cells, fibre, helix, strain = (of_cells[real] for of_cells in (cells, fibre, helix, strain))
-    nodes = np.nan_to_num(nodes)
     angle, percent = (ScalarMappable(Normalize(-end, end), name) for end, name in SCALES)
     figure = style.figure(8.6, 4.2)
     projection = {"projection": "3d", "computed_zorder": False}

@@ -19,6 +19,7 @@ SHIPPED_LOOPS = ("mouse", "rat", "human", "twitch")
 """Loops that are part of echotruth; others are files of the user."""
 FEATURES = {
     **{name: f"realism.{name}.level_dB" for name in ("blood", "surroundings", "haze")},
+    "ring-down": "realism.ring_down.level_dB",
     **{"neighbours": "realism.neighbours.any", "noise": "realism.noise.snr_dB", "rib shadow": "realism.shadow.side"},
     **{"decorrelation of speckle": "realism.decorrelation.time_ms", "attenuation": "probe.attenuation_dB_per_cm_MHz"},
 }
