@@ -102,6 +102,13 @@ def test_acoustics_are_drawn_by_one_key_and_given_ranges_take_precedence():
     assert [case.id for case in expand(again)] == [case.id for case in expand(config)]
 
 
+def test_hearts_and_their_looks_are_drawn_at_once():
+    cases = {"draw": {"number": 4, "preset": ["hearts", "acoustics"], "keys": {"seed": {"integers": [1, 1000]}}}}
+    draws = [case.config for case in expand(configure("realistic", loop={"kind": "circulation"}, cases=cases))]
+    for values in ([each.geometry.scale for each in draws], [each.bmode.gain_dB for each in draws]):
+        assert len(set(values)) == 4
+
+
 @pytest.mark.parametrize("species", ["mouse", "human"])
 def test_acoustics_draw_the_pose_of_each_view(species):
     views = {"preset": "echo", "mine": {"position": 0.4, "offset": {"lateral_mm": 0.1}}}

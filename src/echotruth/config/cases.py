@@ -133,18 +133,28 @@ HEARTS: dict[str, dict[str, Any]] = {
 }
 """Distributions of `cases.draw.preset: hearts`, of any species; docs/cases.md says where each range is from, and how
 many of the hearts are usable."""
-DRAW_PRESETS: dict[str, dict[str, Any]] = {"none": {}, "acoustics": ACOUSTICS, "hearts": HEARTS}
+DRAW_PRESETS = {"acoustics": ACOUSTICS, "hearts": HEARTS}
+
+
+def _as_list(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+def presets_of(draw: dict[str, Any]) -> list[str]:
+    """Names of the presets that the section `cases.draw` asks for, as far as they are known."""
+    given = _as_list(draw.get("preset"))
+    return [name for name in DRAW_PRESETS if isinstance(given, list) and name in given]
 
 
 class Draw(Section):
     """Hearts drawn at random: each has one value of every key in `keys`."""
 
-    preset: Literal["none", "acoustics", "hearts"] = "none"
-    """Keys that are drawn beside those in `keys`. `hearts`: size, shape, fibres, muscle, load and disease, over ranges
-    in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`. `acoustics`: levels
-    of tissues, noise and artefacts, attenuation, gain and grey map, and the pose of each view (`angle_deg`,
-    `offset`, `motion`), each over its published or chosen range (docs/realism.md), so that the looks of a training set
-    differ; use it with a `realism.preset`."""
+    preset: Annotated[list[Literal["acoustics", "hearts"]], BeforeValidator(_as_list)] = Field(default=[])
+    """Keys that are drawn beside those in `keys`: one or both. `hearts`: size, shape, fibres, muscle, load and
+    disease, over ranges in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`.
+    `acoustics`: levels of tissues, noise and artefacts, attenuation, gain and grey map, and the pose of each view
+    (`angle_deg`, `offset`, `motion`), each over its published or chosen range (docs/realism.md), so that the looks of a
+    training set differ; use it with a `realism.preset`."""
     number: Annotated[int, Field(ge=1, le=MAX_CASES)]
     """Number of hearts (of each row of the table and each combination of the grid). A larger number adds hearts, and
     those that were there stay; a power of 2 is the most even."""
@@ -158,8 +168,8 @@ class Draw(Section):
     def _add_preset(cls, values: Any) -> Any:
         if not isinstance(values, dict) or not isinstance(keys := values.get("keys", {}), dict):
             return values
-        preset: dict[str, Any] = DRAW_PRESETS.get(str(values.get("preset")), {})
-        return values | {"keys": preset | keys} if preset else values
+        presets = {key: drawn for name in presets_of(values) for key, drawn in DRAW_PRESETS[name].items()}
+        return values | {"keys": presets | keys} if presets else values
 
 
 def poses(views: dict[str, Any], focus_mm: float) -> dict[str, dict[str, Any]]:
@@ -171,10 +181,6 @@ def poses(views: dict[str, Any], focus_mm: float) -> dict[str, dict[str, Any]]:
             bounds = [round(view.get(key, 0) + scale * bound, 6) for bound in about]
             found[f"views.{name}.{key}"] = {"uniform": bounds}
     return found
-
-
-def _as_list(value: Any) -> Any:
-    return [value] if isinstance(value, str) else value
 
 
 class Cases(Section):

@@ -4,7 +4,7 @@ scan from the array, lengths of trackers from the field of view.
 
 from typing import Any, NamedTuple
 
-from echotruth.config.cases import POSES, poses
+from echotruth.config.cases import POSES, poses, presets_of
 from echotruth.config.imaging import VIEWS
 from echotruth.config.merging import merged, nested
 from echotruth.config.tracking import METHODS, PhaseCorrelation, default_trackers, name_of
@@ -257,7 +257,7 @@ def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
     if isinstance(views, dict) and isinstance(preset := views.get("preset"), str):
         views = VIEWS.get(preset, {}) | {name: view for name, view in views.items() if name != "preset"}
     valid = isinstance(draw, dict) and isinstance(draw.get("keys", {}), dict) and isinstance(views, dict)
-    if not valid or draw.get("preset") != "acoustics" or not isinstance(focus, int | float):
+    if not valid or "acoustics" not in presets_of(draw) or not isinstance(focus, int | float):
         return values
     known = {name: {key: _value({"view": view}, f"view.{key}") for key in POSES} for name, view in views.items()}
     known = {name: {key: v for key, v in keys.items() if isinstance(v, int | float)} for name, keys in known.items()}
