@@ -150,8 +150,8 @@ class Draw(Section):
     """Hearts drawn at random: each has one value of every key in `keys`."""
 
     preset: Annotated[list[Literal["acoustics", "hearts"]], BeforeValidator(_as_list)] = Field(default=[])
-    """Keys that are drawn beside those in `keys`: one or both. `hearts`: size, shape, fibres, muscle, load and
-    disease, over ranges in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`.
+    """Keys that are drawn beside those in `keys`: one or both. `hearts`: size, shape, fibres, muscle, load and disease,
+    over ranges in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`.
     `acoustics`: levels of tissues, noise and artefacts, attenuation, gain and grey map, and the pose of each view
     (`angle_deg`, `offset`, `motion`), each over its published or chosen range (docs/realism.md), so that the looks of a
     training set differ; use it with a `realism.preset`."""
