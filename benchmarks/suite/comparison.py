@@ -1,15 +1,13 @@
-"""Trackers over hearts: their order, the ratios of their scores, and limits of agreement."""
+"""Trackers over hearts: their order and the ratios of their scores."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
-from echotruth.arrays import Floats
-from echotruth.evaluation.agreement import Z
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.paired_ratios import log_scores, pairs, rank_ranges, simultaneous_intervals
-from echotruth.evaluation.resampling import CLIP, LEVELS, means_of_hearts
+from echotruth.evaluation.resampling import CLIP, means_of_hearts
 
 
 def by_heart(clips: pd.DataFrame, column: str) -> pd.DataFrame:
@@ -112,40 +110,3 @@ def deviation(scores: pd.DataFrame) -> float:
     if len(table) < 2 or not len(one):
         return np.nan
     return float(np.median(np.std(table[:, one] - table[:, other], axis=0, ddof=1)))
-
-
-def bland_altman(tracked: Floats, true: Floats) -> dict[str, float]:
-    """Bias and limits of agreement over hearts, with their 95 % confidence intervals.
-
-    The limits are those of :func:`limits_of_agreement`. With d and s the mean and the standard deviation of n
-    differences that are normal, sqrt(n) (limit - d) / s of the true limit follows the noncentral t distribution with n
-    - 1 degrees of freedom and noncentrality -/+ 1.96 sqrt(n), whose quantiles give the exact interval of each limit
-    (Carkeet, Optom Vis Sci 2015; 92:e71, doi 10.1097/OPX.0000000000000513).
-
-    Parameters
-    ----------
-    tracked, true : ndarray of shape (heart,)
-        One value of each heart, as GLS; NaN where unknown.
-
-    Returns
-    -------
-    dict of float
-        bias, lower and upper (limit), in the unit of the values, each with its interval as `_low` and `_high`; and
-        hearts, the number of those of which both are known. NaN with fewer than two of them, but for the bias of one.
-    """
-    from scipy.stats import nct, t
-
-    difference = np.asarray(tracked, float) - np.asarray(true, float)
-    difference = difference[np.isfinite(difference)]
-    n = len(difference)
-    names = [f"{name}{end}" for name in ("bias", "lower", "upper") for end in ("", "_low", "_high")]
-    if n < 2:
-        return dict.fromkeys(names, np.nan) | {"bias": float(difference.sum()) if n else np.nan, "hearts": float(n)}
-    mean, deviation = float(np.mean(difference)), float(np.std(difference, ddof=1))
-    error = deviation / np.sqrt(n)
-    values = [mean, *(mean + error * t.ppf(LEVELS, n - 1))]
-    for z in (-Z, Z):
-        # The quantiles are those of the upper limit, mirrored for the lower one: SciPy's are exact for positive ones.
-        quantiles = nct.ppf(LEVELS, n - 1, Z * np.sqrt(n))
-        values += [mean + z * deviation, *(mean + error * (quantiles if z > 0 else -quantiles[::-1]))]
-    return dict(zip(names, map(float, values), strict=True)) | {"hearts": float(n)}

@@ -15,11 +15,12 @@ import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth import files
+from echotruth.evaluation.agreement import limits_of_agreement
 from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.paired_ratios import LEAST_HEARTS
 
 from . import charts, columns, power, quality
-from .comparison import against, bland_altman, by_heart, deviation, ranking, scores
+from .comparison import against, by_heart, deviation, ranking, scores
 from .detection import detection, recovery
 from .parts import FOLDER, read_parts
 
@@ -145,8 +146,7 @@ class Page:
             for strain in ("gls", "gcs"):
                 of = self.at_largest(clips)
                 true, tracked = (by_heart(of, f"{what}_{strain}_percent") for what in ("true", "tracked"))
-                limits = {str(name): bland_altman(tracked[name], true[name]) for name in tracked}
-                texts = {name: _limits(values, len(true)) for name, values in limits.items()}
+                texts = {str(name): _limits(tracked[name], true[name]) for name in tracked}
                 found |= {f"{strain.upper()}, {species}": texts} if texts else {}
         return self._table("tracker", found, lambda cells, name: cells.get(name, NONE))
 
@@ -276,11 +276,12 @@ def ranks(row: pd.Series) -> str:
     return NONE if not np.isfinite(first) else f"{first:.0f}" if first == last else f"{first:.0f}–{last:.0f}"
 
 
-def _limits(found: dict[str, float], of_hearts: int) -> str:
-    """Bias with its limits of agreement, and of how many hearts if these are not all."""
-    limits = f" [{number(found['lower'])}, {number(found['upper'])}]" if np.isfinite(found["lower"]) else ""
-    few = f", {found['hearts']:.0f} of {of_hearts}" if found["hearts"] < of_hearts else ""
-    return number(found["bias"], 2) + limits + few
+def _limits(tracked: pd.Series, true: pd.Series) -> str:
+    """Bias with its limits of agreement over hearts, and of how many hearts if these are not all."""
+    bias, lower, upper, _ = limits_of_agreement(tracked.to_numpy()[:, None], true.to_numpy()[:, None])[:, 0]
+    limits = f" [{number(lower)}, {number(upper)}]" if np.isfinite(lower) else ""
+    known = int(np.isfinite(tracked).sum())
+    return number(bias, 2) + limits + (f", {known} of {len(true)}" if known < len(true) else "")
 
 
 def _area(table: pd.DataFrame, name: str) -> str:

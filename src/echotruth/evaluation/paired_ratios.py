@@ -129,7 +129,7 @@ def sign_vectors(hearts: int) -> Floats:
     """Signs of the hearts, (flip, heart), first those of the data; opposite ones count once."""
     if hearts <= ALL_SIGNS:
         bits = np.arange(2 ** (hearts - 1))[:, None] >> np.arange(hearts) & 1
-        return 1.0 - 2.0 * bits
+        return np.where(bits, -1.0, 1.0)
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (2**ALL_SIGNS, hearts))
     signs[0] = 1
     return signs
