@@ -3,7 +3,7 @@
     echotruth run config/inference.yaml
     python benchmarks/tracker_errors.py out/inference
     python benchmarks/inference.py out/inference --processes 2
-    python benchmarks/inference.py out/benchmark --processes 2 --motion tracked --size 512
+    python benchmarks/inference.py out/hearts --processes 2 --motion tracked --size 512
 
 Hearts whose label `split` is test are inferred from what the tracker saw, at every image size, with the errors of
 `tracker_errors.csv`, in which they are not; with a prior of contractility as it was drawn; from how they truly moved,
