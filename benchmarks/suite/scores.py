@@ -83,8 +83,9 @@ def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
         for name, settings in config.tracking.trackers.items():
             began = time.process_time()
             arrays, failures = scored(clip, truth, {name: settings})
-            row, segments, steps = clip_rows({key: values[0] for key, values in arrays.items()}, points)
             own = {"tracker": name, "failure": failures.get(name, ""), "cpu_s": time.process_time() - began}
+            stored = as_stored(case, {"tracking/SIZE": arrays})["tracking/SIZE"]
+            row, segments, steps = clip_rows({key: values[0] for key, values in stored.items()}, points)
             tracking = config.tracking.model_copy(update={"trackers": {name: settings}})
             version = version_of("tracking", config.model_copy(update={"tracking": tracking}), view)
             yield keys | own | {"configuration": version} | row | packed_segments(segments) | packed_reliability(steps)

@@ -79,13 +79,16 @@ def test_rows_of_a_view_are_those_of_the_repository_that_a_run_makes(finished):
     for view in case.config.views:
         rows = pd.DataFrame(view_rows(SuiteCase(case, sorts), heart, view))
         keys = ["size_px", "tracker"]
-        of_view = {name: table.query("case == @case.id and view == @view") for name, table in metrics._asdict().items()}
+        of_view = {
+            name: table[(table["case"] == case.id) & (table["view"] == view)]
+            for name, table in metrics._asdict().items()
+        }
         clips = of_view["clips"].set_index(keys).loc[list(zip(*(rows[key] for key in keys), strict=True))]
         for size, image in zip(rows["size_px"], rows["images"], strict=True):
             stored = np.ascontiguousarray(repository.read(f"bmode/{size}/image", case.id, view))
             assert sha256(stored.tobytes()).hexdigest()[:16] == image
         numbers = clips.select_dtypes("number").columns
-        np.testing.assert_allclose(rows[numbers].to_numpy(float), clips[numbers].to_numpy(float), rtol=1e-3, atol=1e-3)
+        np.testing.assert_allclose(rows[numbers].to_numpy(float), clips[numbers].to_numpy(float), rtol=1e-6, atol=1e-6)
         tangential = of_view["segments"].query("component != 'radial'").sort_values([*keys, "aha"])
         found = columns.segments(rows.assign(part=1)).sort_values([*keys, "aha"])
         names = ["aha", *columns.OF_SEGMENT]
