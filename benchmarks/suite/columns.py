@@ -21,17 +21,18 @@ IDENTITY = (
     *("case", "view", "size_px", "tracker"),
 )
 """`split` is develop or test; `species` mouse or human; `group` healthy, infarct, late_activation, hypertrophy or
-dilation; `disease` healthy or diseased; `acoustics` realistic or ideal; `variation` none, motion, shadow or low_rate, or
-several joined by +."""
+dilation; `disease` healthy or diseased; `acoustics` realistic or ideal; `variation` none, motion, shadow or low_rate,
+drawn conditions of realistic clips, which count as the others do."""
 
-ABOUT = ("plane", "diagnosis", "ejection_fraction_percent", "failure", "is_closed", "judged_closed", "cpu_s")
-"""`diagnosis` is what bounds the heart (docs/physiology.md), as fresh or dcm; `failure` why the tracker found nothing,
+ABOUT = ("attempt", "plane", "diagnosis", "ejection_fraction_percent", "failure", "is_closed", "judged_closed", "cpu_s")
+"""`attempt` is the draw that gave a usable heart; `diagnosis` what bounds it (docs/physiology.md), as fresh or dcm;
+`failure` why the tracker found nothing,
 or ""; `is_closed` whether the last frame is followed by the first, and `judged_closed` whether the trackers think so;
 `cpu_s` the CPU time of the tracker."""
 
 HASHES = ("code", "configuration", "images")
-"""Of the code that decides the numbers, of the configuration of the case with the settings of the tracker, and of the
-clip."""
+"""Of the code and the configurations of the whole suite, of those of the view with the settings of the tracker, and of
+the images of the clip."""
 
 TEXT = (*(name for name in IDENTITY if name not in ("part", "size_px")), "plane", "diagnosis", "failure", *HASHES)
 
