@@ -161,7 +161,7 @@ class Page:
 
     def recoveries(self) -> str:
         """What is left of differences between segments in hearts with an infarct."""
-        found = {}
+        found: dict[str, pd.Series] = {}
         for size in self.sizes:
             table = recovery(self._segments(size))
             found |= {f"{what} at {size} px": table[what] for what in ("contrast", "spread")}
