@@ -3,13 +3,13 @@
     echotruth run config/inference.yaml
     python benchmarks/tracker_errors.py out/inference
     python benchmarks/inference.py out/inference --processes 2
-    python benchmarks/inference.py out/benchmark --processes 2 --motion tracked --size 512
+    python benchmarks/inference.py out/hearts --processes 2 --motion tracked --size 512
 
 Hearts whose label `split` is test are inferred from what the tracker saw, at every image size, with the errors of
 `tracker_errors.csv`, in which they are not; with a prior of contractility as it was drawn; from how they truly moved,
 with the error of the model's mesh alone: the difference is what the tracker costs; and by a model of another passive
 law than theirs. Each takes one to four minutes; what is done is kept in results/inference.csv, and the same command
-goes on with the rest. Clips of a variation (label `variation`) are left out. The page is results/inference.md.
+goes on with the rest. The page is results/inference.md.
 
 The rank of a true value is the share of the draws of its posterior that are below it. If hearts were drawn from the
 prior and the posteriors are right, ranks are uniform: as many in the first fifth as in each other (simulation-based
@@ -30,7 +30,6 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 import xarray as xr
-from suite.splits import TEST, is_usual
 
 import echotruth as et
 from echotruth.inference.estimate import COVERED
@@ -99,7 +98,7 @@ class Observed(NamedTuple):
 
 def observed(repository: et.Repository, tracker: str, motions: list[str], sizes: list[int]) -> Iterator[Observed]:
     """What is inferred from: largest images first, then true motion, then the smaller ones."""
-    test = [case for case in repository.every.values() if is_usual(case, TEST)]
+    test = [case for case in repository.every.values() if case.labels.get("split") == "test"]
     cases = [
         case for case in test if not any(repository.problem(case.id, view, "tracking") for view in repository.views)
     ]

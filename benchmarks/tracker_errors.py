@@ -3,8 +3,8 @@
     python benchmarks/tracker_errors.py out/inference                  # the table of the package
     python benchmarks/tracker_errors.py out/mine --all -o errors.csv   # one of hearts and trackers of your own
 
-Only hearts whose label `split` is `develop` count, and only clips without a variation (label `variation` none); with
---all those of every finished case. Rows of other hearts stay in a table that is there.
+Only hearts whose label `split` is `develop` count; with --all those of every finished case. Rows of other hearts stay in
+a table that is there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from suite.splits import DEVELOP, is_usual
 
 import echotruth as et
 from echotruth.arrays import Floats
@@ -26,7 +25,7 @@ from echotruth.inference.observation import ObservationError, heart_name, seen_o
 
 def chosen(case: Case, every: bool) -> bool:
     """Whether the errors of a case are learned."""
-    return every or is_usual(case, DEVELOP)
+    return every or case.labels.get("split") == "develop"
 
 
 def errors(

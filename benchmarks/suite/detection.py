@@ -1,51 +1,44 @@
-"""Detection of infarcts from the strain of segments.
+"""Detection of subtle infarcts from the strain of segments.
 
-An infarcted segment hardly shortens, so that its strain is higher than that of others. The area under the ROC curve is
-the probability that an infarcted segment has the higher one, equal ones counting half (Mann-Whitney; Hanley & McNeil,
-Radiology 1982; 143:29, doi 10.1148/radiology.143.1.7063747). It needs no threshold of strain.
+A segment with a scar in a part of it shortens a little less than the same segment of a healthy heart. The area under
+the ROC curve is the probability that it has the higher strain, equal ones counting half (Mann-Whitney; Hanley & McNeil,
+Radiology 1982; 143:29, doi 10.1148/radiology.143.1.7063747). It needs no threshold of strain. Hearts differ, so that
+true strain does not find all of them either: its area is the ceiling.
 """
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from echotruth.arrays import Floats
-from echotruth.evaluation.resampling import CLIP, draws, percentiles
+from echotruth.evaluation.resampling import draws, percentiles
 from echotruth.evaluation.segment_strain import SHOWN
 
-INFARCTED = 0.5
-"""Share of the innermost layer of a segment above which it is infarcted: infarcts begin at the endocardium (Reimer et
-al., Circulation 1977; 56:786, doi 10.1161/01.CIR.56.5.786)."""
+SUBTLE = 0.5
+"""Share of the tissue of a segment up to which its infarct is subtle."""
 
-TANGENTIAL = ("circumferential", "longitudinal")
-"""Components in which the wall shortens."""
+STRAIN = "peak_percent"
+"""Strain by which segments are told apart: the largest shortening."""
 
-ALL = "all"
-"""Both of them: segments are compared with those of the same component."""
+CLIP = ["heart", "case", "view", "size_px", "tracker"]
 
 
-def infarcted(segments: pd.DataFrame) -> pd.Series:
-    """Whether segments are infarcted.
-
-    Parameters
-    ----------
-    segments : DataFrame
-        As :attr:`echotruth.evaluation.clip_metrics.ClipMetrics.segments`.
-
-    Returns
-    -------
-    Series of float
-        1 if more than half of the innermost layer is infarcted, 0 if no tissue is; NaN between.
-    """
-    extent = segments["infarct_extent"]
-    return extent.gt(INFARCTED).astype(float).where(extent.gt(INFARCTED) | segments["infarct_share"].eq(0))
+def shown(segments: pd.DataFrame) -> pd.DataFrame:
+    """Segments of which a view shows more than a corner."""
+    return segments[segments["points"] >= SHOWN * segments.groupby(CLIP)["points"].transform("max")]
 
 
-def auc(score: ArrayLike, positive: ArrayLike, strata: ArrayLike | None = None) -> float:
+def subtle(segments: pd.DataFrame) -> pd.DataFrame:
+    """Segments with a subtle infarct, `positive`, and the same ones of healthy hearts."""
+    found = shown(segments)
+    share = found["infarct_share"]
+    positive = found["group"].eq("infarct") & share.gt(0) & share.le(SUBTLE)
+    return found.assign(positive=positive)[positive | found["group"].eq("healthy")]
+
+
+def auc(score: ArrayLike, positive: ArrayLike, strata: ArrayLike) -> float:
     """Area under the ROC curve.
 
     Parameters
@@ -53,8 +46,8 @@ def auc(score: ArrayLike, positive: ArrayLike, strata: ArrayLike | None = None) 
     score : array_like of shape (n,)
         Of every segment; NaN says nothing, and counts as equal to all.
     positive : array_like of shape (n,), bool
-        Whether it is infarcted.
-    strata : array_like of shape (n,), optional
+        Whether it has an infarct.
+    strata : array_like of shape (n,)
         Only segments with the same value are compared.
 
     Returns
@@ -63,89 +56,55 @@ def auc(score: ArrayLike, positive: ArrayLike, strata: ArrayLike | None = None) 
         0 to 1; NaN where there is nothing to compare.
     """
     score = np.asarray(score, float)
-    together = np.zeros(len(score), int)
-    won, pairs = _comparisons(score, np.asarray(positive, bool), together, 1, together if strata is None else strata)
-    return float(won.sum() / pairs.sum()) if pairs.sum() else np.nan
+    won, compared = _comparisons(score, np.asarray(positive, bool), np.zeros(len(score), int), 1, strata)
+    return float(won.sum() / compared.sum()) if compared.sum() else np.nan
 
 
-def detection(segments: pd.DataFrame, score: str = "peak_percent", seed: int = 1) -> pd.DataFrame:
-    """Detection of infarcted segments by every tracker.
+def detection(segments: pd.DataFrame) -> pd.DataFrame:
+    """Detection of subtle infarcts by every tracker.
 
     Parameters
     ----------
     segments : DataFrame
-        As :attr:`echotruth.evaluation.clip_metrics.ClipMetrics.segments`, of the clips that are to count.
-    score : str
-        Strain by which segments are told apart, without `tracked_` or `true_`.
-    seed : int
-        Of the bootstrap over hearts.
+        As :func:`.columns.segments` returns them, of one species, image size and acoustics.
 
     Returns
     -------
     DataFrame
-        For every size_px, tracker and `component` (circumferential, longitudinal and all): `auc` with its interval
-        `auc_low` to `auc_high`; `true_auc`, that of the true strain; `infarcted` and `free`, the numbers of segments;
-        `hearts`; and `subendocardial_auc`, `true_subendocardial_auc` and `subendocardial`, of those infarcted segments
-        whose outermost layer is not infarcted for the most part. Segments in between (:func:`infarcted`) and those of
-        which a view shows a corner only (`SHOWN`) are left out. NaN where there is nothing to compare, and in intervals
-        of a single heart.
+        Trackers as rows, and last `true strain`: `auc` with its 95 % interval `low` to `high`, of a bootstrap over
+        hearts; `positive` and `healthy`, the numbers of segments; NaN where there is nothing to compare.
     """
-    view = [name for name in CLIP if name in segments]
-    label, fullest = infarcted(segments), segments.groupby(view)["points"].transform("max")
-    shown = segments["points"].ge(SHOWN * fullest) & segments["component"].isin(TANGENTIAL)
-    chosen = segments.assign(infarcted=label)[label.notna() & shown]
-    return pd.DataFrame(list(_rows(chosen, score, seed)), columns=list(COLUMNS))
+    chosen = subtle(segments)
+    found = {str(name): _area(of, f"tracked_{STRAIN}") for name, of in chosen.groupby("tracker", sort=False)}
+    once = chosen.drop_duplicates([*(name for name in CLIP if name != "tracker"), "aha"])
+    found["true strain"] = _area(once, f"true_{STRAIN}")
+    return pd.DataFrame.from_dict(found, orient="index", columns=["auc", "low", "high", "positive", "healthy"])
 
 
-COLUMNS = (
-    *("size_px", "tracker", "component", "auc", "auc_low", "auc_high", "true_auc", "infarcted", "free", "hearts"),
-    *("subendocardial_auc", "true_subendocardial_auc", "subendocardial"),
-)
-"""Columns of the table."""
-
-
-def _rows(segments: pd.DataFrame, score: str, seed: int) -> Iterator[dict[str, str | int | float]]:
-    """Rows of the table, from segments that are either infarcted or free."""
-    for (size, tracker), of_tracker in segments.groupby(["size_px", "tracker"], sort=False):
-        for component in (*TANGENTIAL, ALL):
-            table = of_tracker if component == ALL else of_tracker[of_tracker["component"] == component]
-            if not len(table):
-                continue
-            positive = table["infarcted"] == 1
-            inner = table[~positive | (table["epicardial_share"] <= INFARCTED)]
-            found, true = (_areas(table, f"{what}_{score}", seed) for what in ("tracked", "true"))
-            inner_found, inner_true = (_area(inner, f"{what}_{score}") for what in ("tracked", "true"))
-            values = (size, tracker, component, *found, true[0], int(positive.sum()), int((~positive).sum()))
-            of_inner = (inner_found, inner_true, int((inner["infarcted"] == 1).sum()))
-            yield dict(zip(COLUMNS, (*values, table["heart"].nunique(), *of_inner), strict=True))
-
-
-def _area(table: pd.DataFrame, column: str) -> float:
-    return auc(table[column], table["infarcted"] == 1, table["component"])
-
-
-def _areas(table: pd.DataFrame, column: str, seed: int) -> tuple[float, float, float]:
-    """Area, and its interval over samples of the hearts in which there are both kinds of segments."""
+def _area(table: pd.DataFrame, column: str) -> tuple[float, float, float, int, int]:
+    """Area, its interval over samples of the hearts, and the numbers of segments with an infarct and of others."""
     names, heart = np.unique(table["heart"].to_numpy(str), return_inverse=True)
-    positive = table["infarcted"].to_numpy(float) == 1
-    won, pairs = _comparisons(table[column].to_numpy(float), positive, heart, len(names), table["component"])
-    if not pairs.sum():
-        return np.nan, np.nan, np.nan
-    drawn = np.stack([np.bincount(sample, minlength=len(names)) for sample in draws(len(names), seed)]).astype(float)
-    won_in, pairs_in = (np.sum((drawn @ matrix) * drawn, axis=1) for matrix in (won, pairs))
-    samples = won_in[pairs_in > 0] / pairs_in[pairs_in > 0]
+    positive = table["positive"].to_numpy(bool)
+    same = table["component"].astype(str) + table["aha"].astype(str)
+    won, compared = _comparisons(table[column].to_numpy(float), positive, heart, len(names), same)
+    counts = int(positive.sum()), int((~positive).sum())
+    if not compared.sum():
+        return np.nan, np.nan, np.nan, *counts
+    drawn = np.stack([np.bincount(sample, minlength=len(names)) for sample in draws(len(names), 1)]).astype(float)
+    won_in, compared_in = (np.sum((drawn @ matrix) * drawn, axis=1) for matrix in (won, compared))
+    samples = won_in[compared_in > 0] / compared_in[compared_in > 0]
     low, high = percentiles(samples[:, None], len(names))
-    return float(won.sum() / pairs.sum()), float(low[0]), float(high[0])
+    return float(won.sum() / compared.sum()), float(low[0]), float(high[0]), *counts
 
 
 def _comparisons(
     score: Floats, positive: NDArray[np.bool_], heart: NDArray[np.integer], hearts: int, strata: ArrayLike
 ) -> tuple[Floats, Floats]:
-    """Comparisons won, and all of them, of the infarcted segments of one heart with the free ones of another.
+    """Comparisons won, and all of them, of the positive segments of one heart with the others of another.
 
     Both are (heart, heart); every stratum is compared in itself.
     """
-    won, pairs = np.zeros((hearts, hearts)), np.zeros((hearts, hearts))
+    won, compared = np.zeros((hearts, hearts)), np.zeros((hearts, hearts))
     stratum = np.asarray(strata)
     for value in np.unique(stratum):
         high, low = (score[(stratum == value) & kind, None] for kind in (positive, ~positive))
@@ -153,5 +112,37 @@ def _comparisons(
         known = np.isfinite(high) & np.isfinite(low.T)
         better = np.where(known, (high > low.T) + 0.5 * (high == low.T), 0.5)
         np.add.at(won, place, better)
-        np.add.at(pairs, place, 1.0)
-    return won, pairs
+        np.add.at(compared, place, 1.0)
+    return won, compared
+
+
+def recovery(segments: pd.DataFrame) -> pd.DataFrame:
+    """What trackers leave of the differences between segments in hearts with an infarct.
+
+    Parameters
+    ----------
+    segments : DataFrame
+        As for :func:`detection`.
+
+    Returns
+    -------
+    DataFrame
+        Trackers as rows: `contrast`, the mean strain of segments with more than half of their tissue in the scar less
+        that of segments without any, and `spread`, the standard deviation over the segments in or at the scar, each
+        tracked over true: sums over the clips, so that clips with small differences do not dominate; and `hearts`.
+    """
+    found = {}
+    infarcts = shown(segments)[lambda rows: rows["group"].eq("infarct")].dropna(subset=[f"tracked_{STRAIN}"])
+    for tracker, of in infarcts.groupby("tracker", sort=False):
+        sums = np.zeros((2, 2))
+        for _, clip in of.groupby(CLIP, sort=False):
+            values = clip[[f"tracked_{STRAIN}", f"true_{STRAIN}"]].to_numpy(float)
+            share = clip["infarct_share"].to_numpy(float)
+            scar, free, touched = values[share > 0.5], values[share == 0], values[share > 0]
+            if len(scar) and len(free):
+                sums[0] += scar.mean(axis=0) - free.mean(axis=0)
+            if len(touched) > 1:
+                sums[1] += touched.std(axis=0, ddof=1)
+        contrast, spread = sums[:, 0] / np.where(sums[:, 1], sums[:, 1], np.nan)
+        found[str(tracker)] = (contrast, spread, of["heart"].nunique())
+    return pd.DataFrame.from_dict(found, orient="index", columns=["contrast", "spread", "hearts"])

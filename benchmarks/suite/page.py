@@ -1,331 +1,299 @@
-"""Page of the benchmark: Markdown with figures, and a table of all values, in a folder beside it."""
+"""Page of the suite, docs/benchmark.md: its tables, from the parts alone.
+
+python -m benchmarks.suite.page --split develop
+"""
 
 from __future__ import annotations
 
-import re
+import argparse
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from tempfile import TemporaryFile
+from typing import Any
 
+import numpy as np
 import pandas as pd
-import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth import files
-from echotruth.evaluation.resampling import CLIP
-from echotruth.evaluation.tracker_options import EvaluationError, parse_tracker
-from echotruth.repository.estimates import NotEvaluated
-from echotruth.section import Section
+from echotruth.evaluation.agreement import limits_of_agreement
+from echotruth.evaluation.leaderboard import RANKED_BY
+from echotruth.evaluation.paired_ratios import LEAST_HEARTS
 
-from . import card, charts, checks, examples, reliability, tables
-from .card import Card
-from .conditions import PLAIN, main_conditions
-from .records import Records, Suite
-from .splits import split_of
-from .standings import agreement, detections, main_errors, order, shown_size, standings, varied
+from . import charts, columns, power, quality
+from .comparison import against, by_heart, deviation, ranking, scores
+from .detection import detection, recovery
+from .parts import FOLDER, read_parts
 
-DRAWN = 6
-"""Largest number of trackers in a figure whose colours tell them apart."""
+REFERENCE = "bspline_dic"
+"""Tracker with which others are compared in people, who are few."""
 
-EXAMPLE = Card(
-    tracker="mine",
-    name="Our network",
-    authors=["A. Author", "B. Author"],
-    code="https://example.org/network, version 1.0",
-    trained_on="Kubric",
-    tuned_on="hearts of the split develop",
-    splits_seen=["develop"],
-    date="2026-11-23",
-)
-"""Card that the page shows."""
+EFFECTS = (0.05, 0.1, 0.15, 0.18, 0.25, 0.35, 0.5)
+"""Shares by which a score is smaller, of which the page has the power."""
+
+OTHERS = {
+    "segment_peak_error_pp": ("segmental peak strain (pp)", 1),
+    "drift_um": ("drift (µm)", 1),
+    "cpu_s": ("CPU (s a clip)", 2),
+}
+"""Metric -> its heading, of which there is the median over the clips, and its decimals."""
+
+NONE = "–"
 
 
 class Page:
-    """The tables and figures of one page.
+    """Tables and figures of one page.
 
     Parameters
     ----------
-    records : Records
-        Of all hearts.
-    split : str
-        Half that is reported.
+    parts : DataFrame
+        As :func:`.parts.read_parts` returns it.
+    split : {"develop", "test"}
+        Half of the hearts that is reported.
     """
 
-    def __init__(self, records: Records, split: str) -> None:
-        self.whole, self.split = records, split
-        self.records = records.of_split(split)
-        self.main = self.records.of_main_species()
-        self.sizes, self.largest = self.main.sizes, self.main.largest
-        self.cards = _cards(records)
-        self._verdicts: dict[str, checks.Verdict] = {}
-        self.withheld = self._withheld()
-        ranked = self.records.clips[~self.records.clips["tracker"].isin(self.withheld)]
-        self.is_empty = ranked.empty or not main_conditions(ranked)
-        self.standings = ranked if self.is_empty else standings(ranked)
-        self.order = [] if self.is_empty else order(self.standings, self.largest)
-
-    def _withheld(self) -> dict[str, str]:
-        """Trackers from outside that are shown but not ranked, and why."""
-        own = {name for suite in self.records.suites for name in suite.config.tracking.trackers}
-        found = {}
-        for tracker in (name for name in dict.fromkeys(self.records.clips["tracker"]) if name not in own):
-            reasons = list(self.verdict(tracker).flags)
-            if tracker in self.cards and self.cards[tracker].has_seen_test:
-                reasons.insert(0, "its card says that it has seen the half test")
-            if reasons:
-                found[tracker] = "; ".join(reasons)
-        return found
-
-    @property
-    def everyone(self) -> list[str]:
-        """All trackers, those without a rank last."""
-        return [*self.order, *self.withheld]
-
-    def leaderboard(self) -> str:
-        """The short leaderboard as text: median error by main condition at the largest size, with ranges of ranks."""
-        withheld = [f"{tracker} is not ranked: {reason}." for tracker, reason in self.withheld.items()]
-        if self.is_empty:
-            return "\n".join([self.nothing, *withheld])
-        columns = {}
-        for name, part in main_errors(self.standings).groupby("condition", sort=False):
-            size = shown_size(part, self.largest)
-            rows = part[(part["size_px"] == size) & part["value"].notna()].set_index("tracker")
-            heading = f"{name}" if size == self.largest else f"{name} ({size} px)"
-            columns[heading] = rows.apply(lambda row: f"{row['value']:.1f} [{tables.rank(row)}]", axis=1)
-        widths = [len(heading) + 1 for heading in columns]
-        cells = pd.DataFrame(columns, index=self.order).rename_axis(columns="tracker")
-        table = cells.to_string(na_rep="-", col_space=widths)
-        title = f"NRMSE at end-systole, % at {self.largest} px, median over the {self.split} hearts [rank]"
-        return "\n".join([title, "", table, *([""] if withheld else []), *withheld])
-
-    @property
-    def nothing(self) -> str:
-        """Why there is no result; empty if there is one."""
-        if not self.is_empty:
-            return ""
-        if not any(parts.get(self.split) for parts in _groups(self.records.suites)):
-            return f"No clip of the half {self.split} is evaluated: the repositories have no heart of it."
-        if set(self.records.clips["tracker"]) - set(self.withheld):
-            return f"No clip of the half {self.split} is evaluated yet but those of a variation, which rank nobody."
-        return "No tracker is ranked." if self.withheld else f"No clip of the half {self.split} is evaluated yet."
-
-    def write(self, path: Path, command: str) -> Path:
-        """Write the page, and beside it a folder with its figures and `leaderboard.csv`.
-
-        What a person wrote into an earlier page between the comments about and /about, and history and /history, is
-        kept.
-
-        Parameters
-        ----------
-        path : Path
-            Markdown file; the folder has its name without suffix.
-        command : str
-            Command line that made it.
-
-        Returns
-        -------
-        Path
-            The file. The same repositories give the same bytes.
-        """
-        folder = path.with_suffix("")
-        values = {"page": self, "tables": tables, "checks": checks, "command": command, "kept": _written(path)}
-        values |= {
-            "drawn": DRAWN,
-            "card": yaml.safe_dump(EXAMPLE.model_dump(exclude_none=True), sort_keys=False).rstrip(),
+    def __init__(self, parts: pd.DataFrame, split: str) -> None:
+        self.split, self.code = split, ", ".join(sorted(parts["code"].dropna().str[:12].unique()))
+        self.clips = parts[parts["split"] == split].assign(failure=lambda rows: rows["failure"].fillna(""))
+        self.sizes: list[int] = sorted(map(int, self.clips["size_px"].unique()), reverse=True)
+        self.mice, self.people = (self.of(species=name, acoustics="realistic") for name in ("mouse", "human"))
+        self.boards = {size: ranking(scores(self.mice[self.mice["size_px"] == size])) for size in self.sizes}
+        self.order = [str(name) for name in next(iter(self.boards.values())).index] if len(self.mice) else []
+        self.hearts = {"mice": self.mice["heart"].nunique(), "people": self.people["heart"].nunique()}
+        self.deviations = {
+            "mice": deviation(scores(self.at_largest(self.mice))),
+            "people": deviation(scores(self.at_largest(self.people))),
         }
-        if not self.is_empty:
-            folder.mkdir(parents=True, exist_ok=True)
-            values |= {"agreement": agreement, "detections": detections, "varied": varied}
-            values["pictures"] = self._draw(folder)
-            self.standings.to_csv(folder / "leaderboard.csv", index=False, float_format="%.6g")
-        environment = Environment(
-            loader=FileSystemLoader(Path(__file__).parent),
-            undefined=StrictUndefined,
-            keep_trailing_newline=True,
-            trim_blocks=True,
-            lstrip_blocks=True,
-        )
-        text = environment.get_template("page.md.jinja").render(values)
-        files.write(path, text.replace("BENCHMARK_FILES", folder.name).encode())
-        return path
+        self.power = self._power()
 
-    def _draw(self, folder: Path) -> list[tuple[str, str, str]]:
-        """Draw the figures; tracker, file and description of those of examples."""
-        clips, first = self.main.clips, self.order[:DRAWN]
-        charts.draw_conditions(folder / "conditions.png", self.standings, self._floors(), self.order)
-        charts.draw_floors(folder / "floors.png", clips, self.records.difficulty, first)
-        charts.draw_reliability(folder / "reliability.png", reliability.curve(self.main.reliability), first)
-        repositories = {suite.name: suite.repository for suite in self.records.suites}
-        stored = {name for suite in self.records.suites for name in suite.repository.trackers}
-        found = []
-        for tracker in self.everyone:
-            of = clips[(clips["tracker"] == tracker) & (clips["size_px"] == self.largest)]
-            if tracker not in stored or of.empty:
-                continue
-            rows = examples.chosen(of)
-            try:
-                drawn = [examples.example(repositories[row["repository"]], row, what) for what, row in rows.items()]
-            except NotEvaluated:  # what is kept is older than the scores
-                continue
-            examples.draw(folder / f"example_{tracker}.png", drawn)
-            words = "; ".join(one.title.replace("\n", ", ") for one in drawn)
-            found.append((tracker, f"example_{tracker}.png", f"Tracked points at end-systole. {words}"))
-        return found
+    def of(self, **values: object) -> pd.DataFrame:
+        """Clips with the given values of columns."""
+        return self.clips[np.logical_and.reduce([self.clips[name] == value for name, value in values.items()])]
 
-    def _floors(self) -> pd.DataFrame:
-        """Median floor by condition and size."""
-        plain = self.records.clips[self.records.clips["variation"].isin(PLAIN)]
-        clips = plain.drop_duplicates(list(CLIP))
-        both = clips.merge(self.records.difficulty, on=list(CLIP))
-        return both.groupby(["condition", "size_px"], sort=False)["floor_percent"].median().reset_index()
+    def at_largest(self, clips: pd.DataFrame) -> pd.DataFrame:
+        """Those of some clips at the largest image size."""
+        return clips[clips["size_px"] == max(self.sizes, default=0)]
 
-    @property
-    def unfinished(self) -> str:
-        """Which repositories are not whole; empty if all are."""
-        suites = [suite for suite in self.records.suites if len(suite.complete) < suite.expected]
-        return " ".join("`{}` has {} of {} clips.".format(suite.name, *suite.clips) for suite in suites)
+    def _power(self) -> dict[str, power.Power]:
+        """What the hearts can show, by who is compared."""
+        kinds = (("mice", "each with each", False), ("mice", "with one", True), ("people", "with one", True))
+        return {
+            f"{self.hearts[name]} {name}, {words}": power.simulate(self.hearts[name], self.deviations[name], is_one)
+            for name, words, is_one in kinds
+            if self.hearts[name] >= LEAST_HEARTS and np.isfinite(self.deviations[name])
+        }
 
-    @property
-    def is_balanced(self) -> bool:
-        """Whether each half has hearts of each group."""
-        return all(all(parts.values()) for parts in _groups(self.records.suites))
+    def contents(self) -> str:
+        """Number of hearts by group and species."""
+        hearts = self.clips.drop_duplicates(["species", "heart"])
+        counts = pd.crosstab(hearts["group"], hearts["species"]).sort_index(key=lambda names: names != "healthy")
+        rows = [[str(group).replace("_", " "), *map(str, row)] for group, row in counts.T.items()]
+        return markdown(["group", *map(str, counts.columns)], rows)
 
-    @property
-    def halves(self) -> list[str]:
-        """Halves of which there are hearts."""
-        return sorted({split_of(case) for suite in self.records.suites for case in suite.repository.every.values()})
-
-    @property
-    def conditions(self) -> list[str]:
-        """Main conditions."""
-        return list(dict.fromkeys(self.standings[self.standings["is_main"]]["condition"]))
-
-    def trackers(self) -> str:
-        """Who made each tracker, and what it had seen; of those of a configuration, their settings."""
+    def board(self) -> str:
+        """Mice: ranges of ranks and errors at all image sizes, ratios to the first, and other metrics."""
+        first, *rest = self.sizes
+        of = self.at_largest(self.mice).groupby("tracker")
+        others = {metric: about for metric, about in OTHERS.items() if metric in self.mice}
+        medians, failed = of[list(others)].median(), of["failure"].agg(lambda text: (text != "").sum())
         rows = []
-        for tracker in self.everyone:
-            if tracker in self.cards:
-                of = self.cards[tracker]
-                name = f"{of.name}, {', '.join(of.authors)}" + (f" (doi {of.doi})" if of.doi else "")
-                seen = ", ".join(of.splits_seen) or "neither"
-                rows.append([f"`{tracker}`", name, of.code, of.trained_on, of.tuned_on, seen])
-            else:
-                rows.append([f"`{tracker}`", self._own_settings(tracker), *[""] * 4])
-        headings = ["tracker", "what it is", "code", "trained on", "tuned on", "halves seen"]
-        shown = len(headings) if self.cards else 2
-        return tables.markdown(headings[:shown], [row[:shown] for row in rows], text=shown)
+        for name, row in self.boards[first].iterrows():
+            cells = [ranks(row), number(row["score"]), interval(row, 2)]
+            for size in rest:
+                other = self.boards[size].reindex([name]).iloc[0]
+                cells += [ranks(other), number(other["score"])]
+            cells += [number(medians.at[name, metric], digits) for metric, (_, digits) in others.items()]
+            rows.append([f"`{name}`", *cells, f"{failed[name]} of {of.size()[name]}"])
+        headings = ["rank", f"NRMSE at {first} px (%)", "to the first"]
+        headings += [text for size in rest for text in (f"rank at {size} px", f"NRMSE at {size} px (%)")]
+        return markdown(["tracker", *headings, *(text for text, _ in others.values()), "clips failed"], rows)
 
-    def _own_settings(self, tracker: str) -> str:
-        """Settings of a tracker in the configurations, and of which each is if they differ."""
-        found: dict[str, list[str]] = {}
-        for suite in self.records.suites:
-            if tracker in suite.config.tracking.trackers:
-                words = _settings(suite.config.tracking.trackers[tracker])
-                found.setdefault(words, []).append(f"`{suite.name}`")
-        if len(found) > 1:
-            return ". ".join(f"In {' and '.join(names)}: {words}" for words, names in found.items())
-        return next(iter(found), "no card")
+    def conditions(self) -> str:
+        """Geometric mean errors of mice by what is changed, at the largest size."""
+        mice = self.at_largest(self.of(species="mouse"))
+        real, ideal = (mice[mice["acoustics"] == name] for name in ("realistic", "ideal"))
+        found = {"all, realistic": real, "ideal": ideal}
+        found["realistic, hearts of ideal"] = real[real["heart"].isin(ideal["heart"])]
+        for column in ("variation", "disease", "plane"):
+            found |= {f"{value}".replace("_", " "): real[real[column] == value] for value in real[column].unique()}
+        found = {name.replace("none", "nothing else"): of for name, of in found.items() if len(of)}
+        means = {
+            f"{name} ({of['heart'].nunique()})": np.exp(scores(of).mean(skipna=False)) for name, of in found.items()
+        }
+        return self._table("tracker", means, lambda values, name: number(values.get(name, np.nan)))
 
-    def reliability(self) -> str:
-        """Stated and observed share of right points, and the calibration error, by size."""
-        known = self.main.reliability.groupby(["tracker", "size_px"])
-        cells = {clips: _stated_and_right(of) for clips, of in known}
+    def against(self) -> str:
+        """People: ratios to the reference at all image sizes."""
+        found = {}
+        for size in self.sizes:
+            of = scores(self.people[self.people["size_px"] == size])
+            if REFERENCE in of and of[REFERENCE].notna().all():
+                own = pd.DataFrame({"score": [np.exp(of[REFERENCE].mean())]}, index=[REFERENCE])
+                found[size] = pd.concat([own, against(of, REFERENCE)])
+
+        def verdict(table: pd.DataFrame, name: str) -> str:
+            if name not in table.index:
+                return NONE
+            row = table.loc[name]
+            words = "worse" if row["low"] > 1 else "better" if row["high"] < 1 else "not told apart"
+            return f"{number(row['score'])}; " + (f"{interval(row, 2)}, {words}" if name != REFERENCE else "reference")
+
+        return self._table("NRMSE (%); ratio", {f"{size} px": table for size, table in found.items()}, verdict)
+
+    def agreement(self) -> str:
+        """Bias and limits of agreement of GLS and GCS, percentage points."""
+        found: dict[str, dict[str, str]] = {}
+        for species, clips in (("mice", self.mice), ("people", self.people)):
+            for strain in ("gls", "gcs"):
+                of = self.at_largest(clips)
+                true, tracked = (by_heart(of, f"{what}_{strain}_percent") for what in ("true", "tracked"))
+                texts = {str(name): _limits(tracked[name], true[name]) for name in tracked}
+                found |= {f"{strain.upper()}, {species}": texts} if texts else {}
+        return self._table("tracker", found, lambda cells, name: cells.get(name, NONE))
+
+    def detections(self) -> str:
+        """Areas under the curve of subtle infarcts in mice."""
+        found = {f"{size} px": detection(self._segments(size)) for size in self.sizes}
+        names = [*self.order, "true strain"]
+        table = self._table("tracker", found, _area, names)
+        counts = next(iter(found.values())).iloc[-1]
+        told = f"{counts['positive']:.0f} segments with a subtle infarct and {counts['healthy']:.0f} healthy ones"
+        return f"{table}\n\nOf {told}."
+
+    def recoveries(self) -> str:
+        """What is left of differences between segments in hearts with an infarct."""
+        found: dict[str, pd.Series] = {}
+        for size in self.sizes:
+            table = recovery(self._segments(size))
+            found |= {f"{what} at {size} px": table[what] for what in ("contrast", "spread")}
+        return self._table("tracker", found, lambda values, name: number(values.get(name, np.nan), 2))
+
+    def qualities(self) -> str:
+        """Stated and observed share of right points by acoustics, plane and image size, and the calibration error."""
+        mice = self.of(species="mouse").sort_values("size_px", ascending=False, kind="stable")
+        steps = columns.reliability(mice).merge(mice[["case", "view", "plane"]].drop_duplicates())
+        keys = ["acoustics", "plane", "size_px"]
+        found = {
+            f"{acoustics}, {plane.replace('_', ' ')}, {size} px": {
+                str(name): quality.stated_and_right(rows) for name, rows in of.groupby("tracker")
+            }
+            for (acoustics, plane, size), of in steps.groupby(keys, sort=False)
+        }
+        return self._table("tracker", found, lambda cells, name: " / ".join(map(number, cells.get(name, ()))) or NONE)
+
+    def powers(self) -> str:
+        """Power by effect and who is compared."""
         rows = [
-            [f"`{tracker}`", *(cells.get((tracker, size), tables.NONE) for size in self.sizes)]
-            for tracker in self.everyone
+            [f"{100 * less:.0f} %", *(f"{100 * found.of(less):.0f}" for found in self.power.values())]
+            for less in EFFECTS
         ]
-        return tables.markdown(["stated / right / calibration error (%)", *(f"{size} px" for size in self.sizes)], rows)
+        least = (f"{100 * found.least:.0f} %" for found in self.power.values())
+        false = (f"{100 * found.false_order:.1f}" for found in self.power.values())
+        return markdown(
+            ["error smaller by", *self.power],
+            [*rows, ["**shown in 80 %**", *least], ["**equal ones ordered**", *false]],
+        )
 
-    def failures(self) -> str:
-        """Drift, failures and coverage, and the error in open clips over that in closed ones."""
-        clips, rows = self.main.clips, []
-        for tracker in self.everyone:
-            of = clips[clips["tracker"] == tracker]
-            largest = of[of["size_px"] == self.largest]
-            failed = int((of["failure"] != "").sum())
-            cells = [f"{failed} of {len(of)}", tables.number(largest["coverage_percent"].median())]
-            again = checks.variants_of(self.records.suites, tracker, "open")
-            ratios = (checks.paired_ratio(of[of["size_px"] == size], again.rows) for size in self.sizes)
-            open_ = ["older" if ratio is None and again.older else _with_part(ratio) for ratio in ratios]
-            rows.append([f"`{tracker}`", tables.number(largest["drift_um"].median()), *cells, *open_])
-        headings = ["tracker", "drift (µm)", "clips failed", "tissue tracked (%)"]
-        return tables.markdown([*headings, *(f"open, {size} px" for size in self.sizes)], rows)
+    def draw(self, folder: Path) -> None:
+        """Draw the figures."""
+        folder.mkdir(parents=True, exist_ok=True)
+        charts.draw_ratios(folder / "ratios.png", self.boards)
+        if self.power:
+            charts.draw_power(folder / "power.png", self.power)
+        curves = quality.curve(columns.reliability(self.mice))
+        charts.draw_reliability(folder / "reliability.png", curves, self.order)
 
-    def verdict(self, tracker: str) -> checks.Verdict:
-        """What was found of a tracker, by its name or `package.module:function`."""
-        name = parse_tracker(tracker, None, [])[0] if ":" in tracker else tracker
-        if name not in self._verdicts:
-            self._verdicts[name] = checks.verdict(name, self.whole, self.split)
-        return self._verdicts[name]
+    def _segments(self, size: int) -> pd.DataFrame:
+        return columns.segments(self.mice[self.mice["size_px"] == size])
 
-    def verdicts(self) -> str:
-        """Verdicts on all trackers."""
-        rows = []
-        for found in map(self.verdict, self.everyone):
-            counted = f"{found.impossible} of {found.clips}"
-            rows.append(
-                [f"`{found.tracker}`", _shown(found.mirrored), counted, tables.number(found.gap, 2), found.words]
-            )
-        return tables.markdown(["tracker", "mirrored", "impossible", "test / develop", "verdict"], rows)
+    def _table(
+        self, corner: str, found: dict[str, Any], text: Callable[[Any, str], str], names: Iterable[str] = ()
+    ) -> str:
+        """A row per tracker, and a column for each entry, of which `text` makes the cell of a tracker."""
+        shown = ["`" + name + "`" if name in self.order else name for name in names or self.order]
+        rows = [[name, *(text(values, name.strip("`")) for values in found.values())] for name in shown]
+        return markdown([corner, *found], rows)
 
 
-def check_writable(path: Path) -> None:
-    """Check that a page can be written; EvaluationError if not."""
-    if path.suffix != ".md":
-        raise EvaluationError(f"--page {path}: must be a Markdown file: give a name that ends in .md")
-    if path.is_dir():
-        raise EvaluationError(f"--page {path}: is a folder: give the name of a file")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=path.parent):
-            pass
-    except OSError as error:
-        remedy = f"it must be a folder that you may write to ({error.strerror})"
-        raise EvaluationError(f"--page {path}: cannot be written in {path.parent}: {remedy}") from error
+def with_cost(parts: pd.DataFrame, folder: Path = FOLDER) -> pd.DataFrame:
+    """Parts with a column `cpu_s`, the mean CPU time of a tracker in such clips, from the files beside them."""
+    tables = [pd.read_csv(file) for file in sorted(folder.glob("cost-*.csv"))]
+    if "cpu_s" in parts or not tables:
+        return parts
+    keys, cost = ["species", "view", "size_px", "tracker"], pd.concat(tables)
+    sums = cost.assign(cpu_s=cost["mean"] * cost["count"]).groupby(keys)[["cpu_s", "count"]].sum()
+    return parts.merge((sums["cpu_s"] / sums["count"]).rename("cpu_s").reset_index(), on=keys, how="left")
 
 
-def _groups(suites: list[Suite]) -> list[dict[str, set[str]]]:
-    """Hearts by half, of every group of every repository."""
-    return [parts for suite in suites for parts in tables.hearts_by_group(suite).values()]
+def write(parts: pd.DataFrame, file: Path, split: str = "test") -> Path:
+    """Write the page, and its figures to a folder beside it.
+
+    Parameters
+    ----------
+    parts : DataFrame
+        As :func:`.parts.read_parts` returns it, with the costs of :func:`with_cost` or without.
+    file : Path
+        Markdown; the folder has its name without suffix.
+    split : {"develop", "test"}
+
+    Returns
+    -------
+    Path
+        The file. The same parts give the same bytes.
+    """
+    page, folder = Page(with_cost(parts), split), file.with_suffix("")
+    if page.order:
+        page.draw(folder)
+    environment = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    template = environment.get_template("page.md.jinja")
+    text = template.render(page=page, folder=folder.name, reference=REFERENCE, ranked_by=RANKED_BY, least=LEAST_HEARTS)
+    files.write(file, f"{text}\n".encode())
+    return file
 
 
-def _settings(settings: Section) -> str:
-    """Method of a tracker of echotruth, and the settings that are not its defaults."""
-    given = settings.model_dump(mode="json", exclude_defaults=True) | {"method": settings.method}  # type: ignore[attr-defined]
-    method = given.pop("method")
-    return "; ".join([f"`{method}` of echotruth", *(f"{key} {value}" for key, value in given.items())])
+def markdown(headings: list[str], rows: list[list[str]]) -> str:
+    """A table of which the first column is text."""
+    lines = [headings, ["---", *["---:"] * (len(headings) - 1)], *rows]
+    return "\n".join(f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in line)} |" for line in lines)
 
 
-def _written(path: Path) -> dict[str, str]:
-    """What a person wrote into an earlier page, by the name of its place."""
-    text = path.read_text(encoding="utf-8") if path.is_file() else ""
-    found = {"about": "", "history": "- Nothing is noted yet."}
-    for name in found:
-        if match := re.search(rf"<!-- {name} -->\n(.*?)\n?<!-- /{name} -->", text, re.DOTALL):
-            found[name] = match[1]
-    return found
+def number(value: float, decimals: int = 1) -> str:
+    """A number as text; a dash where it is not known."""
+    # Adding 0 makes 0 of -0.
+    return f"{round(float(value), decimals) + 0.0:.{decimals}f}".replace("-", "−") if np.isfinite(value) else NONE
 
 
-def _stated_and_right(of: pd.DataFrame) -> str:
-    """Stated and observed share of right points, and the calibration error, %, of rows of the reliability."""
-    if not (count := of["count"].sum()):
-        return tables.NONE
-    stated, right = (100 * of[name].sum() / count for name in ("quality_sum", "within_count"))
-    return tables.SLASH.join(map(tables.number, (stated, right, reliability.calibration_error(of))))
+def interval(row: pd.Series, decimals: int) -> str:
+    """A ratio with its interval, if it has one."""
+    low, high = (number(row[end], decimals) for end in ("low", "high"))
+    return number(row["ratio"], decimals) + (f" ({low}–{high})" if row["low"] < row["high"] < np.inf else "")
 
 
-def _shown(ratio: checks.Ratio | None) -> str:
-    return tables.NONE if ratio is None else tables.interval(ratio.value, ratio.low, ratio.high, 2)
+def ranks(row: pd.Series) -> str:
+    """Range of ranks."""
+    first, last = row["rank_first"], row["rank_last"]
+    return NONE if not np.isfinite(first) else f"{first:.0f}" if first == last else f"{first:.0f}–{last:.0f}"
 
 
-def _with_part(ratio: checks.Ratio | None) -> str:
-    """A ratio, and of which clips it is if that is not all."""
-    return ", ".join(filter(None, [_shown(ratio), ratio.part if ratio else ""]))
+def _limits(tracked: pd.Series, true: pd.Series) -> str:
+    """Bias with its limits of agreement over hearts, and of how many hearts if these are not all."""
+    bias, lower, upper, _ = limits_of_agreement(tracked.to_numpy()[:, None], true.to_numpy()[:, None])[:, 0]
+    limits = f" [{number(lower)}, {number(upper)}]" if np.isfinite(lower) else ""
+    known = int(np.isfinite(tracked).sum())
+    return number(bias, 2) + limits + (f", {known} of {len(true)}" if known < len(true) else "")
 
 
-def _cards(records: Records) -> dict[str, Card]:
-    """Cards of the trackers of all repositories."""
-    trackers = records.clips["tracker"].unique()
-    # That of the first repository counts.
-    folders = [suite.repository.folder for suite in reversed(records.suites)]
-    found = ((name, card.card_of(folder, name)) for folder in folders for name in trackers)
-    return {name: of for name, of in found if of is not None}
+def _area(table: pd.DataFrame, name: str) -> str:
+    """Area under the curve with its interval."""
+    if name not in table.index or not np.isfinite(table.at[name, "auc"]):
+        return NONE
+    return "{} ({}–{})".format(*(number(table.at[name, column], 2) for column in ("auc", "low", "high")))
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.suite.page")
+    parser.add_argument("--split", choices=("develop", "test"), default="test", help="hearts to report (default: test)")
+    parser.add_argument("--page", type=Path, default=Path("docs/benchmark.md"), help="file (default: %(default)s)")
+    given = parser.parse_args()
+    print(write(read_parts(), given.page, given.split))

@@ -109,7 +109,7 @@ def test_output_can_be_printed(call, tmp_path):
     ("arguments", "sentence"),
     [
         (["humn"], "humn is not a preset: did you mean human?"),
-        (["zzz"], "zzz is not a preset: use one of ablation, "),
+        (["zzz"], "zzz is not a preset: use one of demo, "),
         (["../demo"], "../demo is not a preset"),
         (["mouse", "-o", "nowhere/a.yaml"], "nowhere/a.yaml: cannot be written (No such file or directory)"),
         (["mouse", "-o", "/dev/null/a"], "cannot be written (Not a directory)"),

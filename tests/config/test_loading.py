@@ -73,10 +73,7 @@ def test_missing_file_is_named(tmp_path):
         load(tmp_path / "nowhere.yaml")
 
 
-BENCHMARKS = ["ablation", "benchmark", "benchmark_human", "benchmark_small"]
-
-
-@pytest.mark.parametrize("name", [*BENCHMARKS, "demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
+@pytest.mark.parametrize("name", ["demo", "fimh25", "hearts", "paper", "realistic", "rodero", "sweep"])
 def test_shipped_configurations_are_accepted_in_every_folder(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert load(ROOT / f"config/{name}.yaml").name == name

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.suite.comparison import bland_altman
 from echotruth.evaluation.agreement import compare, limits_of_agreement
 from echotruth.evaluation.displacement_error import WallPoints
 
@@ -53,28 +52,3 @@ def test_parts_of_the_error_add_up(strains):
     whole = compare(tracked, true, WALL, 1)["strain_bias"]
     shown, smoothed = (compare(true[k], true, WALL, 1)["strain_bias"] for k in (1, 2))
     np.testing.assert_allclose(whole[0], shown[0] + smoothed[1] + whole[2], atol=1e-12)
-
-
-def test_exact_intervals_over_hearts_hold_the_true_limits_in_95_of_100_samples():
-    hearts, samples = 8, 200_000
-    standard = np.arange(hearts) - (hearts - 1) / 2
-    standard /= standard.std(ddof=1)
-    found = bland_altman(standard, np.zeros(hearts))
-    # The intervals of any sample are those of the standard one, times its standard deviation and moved by its mean.
-    values = np.random.default_rng(8).normal(2, 3, (samples, hearts))
-    mean, deviation = values.mean(axis=1), values.std(axis=1, ddof=1)
-    for name, truth in (("bias", 2), ("lower", 2 - 1.96 * 3), ("upper", 2 + 1.96 * 3)):
-        low, high = (mean + deviation * found[f"{name}_{end}"] for end in ("low", "high"))
-        # Of so many samples, the share itself varies by 0.0005.
-        assert np.mean(low > truth) == pytest.approx(0.025, abs=0.002)
-        assert np.mean(high < truth) == pytest.approx(0.025, abs=0.002)
-
-
-def test_limits_over_hearts_are_those_over_rows_and_unknown_hearts_do_not_count():
-    random = np.random.default_rng(9)
-    tracked, true = random.normal(-15, 3, 9), random.normal(-16, 3, 9)
-    found = bland_altman(np.append(tracked, np.nan), np.append(true, -10.0))
-    expected = limits_of_agreement(tracked[:, None], true[:, None])[:3, 0]
-    np.testing.assert_allclose([found[name] for name in ("bias", "lower", "upper")], expected)
-    one = bland_altman(tracked[:1], true[:1])
-    assert found["hearts"] == 9 and one["bias"] == tracked[0] - true[0] and np.isnan(one["upper"])

@@ -1,16 +1,11 @@
-"""Intervals over hearts, paired differences of trackers, and the ranks that they allow."""
+"""Intervals of means over hearts, and the values of hearts."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.suite.comparison import by_heart, paired, standing
+from benchmarks.suite.comparison import by_heart
 from echotruth.evaluation.resampling import draws, interval, ranks
-
-
-def table(**values):
-    """Hearts as rows and trackers as columns."""
-    return pd.DataFrame({name: np.asarray(each, float) for name, each in values.items()})
 
 
 def test_interval_of_two_hearts_is_the_whole_range():
@@ -36,70 +31,6 @@ def test_interval_of_24_normal_hearts_holds_the_truth_in_some_95_of_100_samples(
 
 def test_equal_trackers_share_a_rank():
     np.testing.assert_array_equal(ranks(np.array([3.0, 1.0, 1.0, 2.0, np.nan])), [4, 1, 1, 3, np.nan])
-
-
-def test_trackers_have_ranks_of_their_own_where_their_paired_intervals_do_not_reach_zero():
-    found = standing(
-        table(b=[4, 9, 4, 9, 5, 7], a=[1, 2, 3, 2, 1, 2], c=[9, 4, 9, 4, 6, 6.5], d=[50, 51, 52, 53, 54, 55])
-    )
-    assert list(found.index) == ["a", "b", "c", "d"]
-    assert found[["rank_first", "rank_last"]].to_numpy().tolist() == [[1, 1], [2, 3], [2, 3], [4, 4]]
-    assert (found["low"] <= found["value"]).all() and (found["value"] <= found["high"]).all()
-    assert found.loc["a", "difference"] == 0 and np.isnan(found.loc["a", "p_value"])
-
-
-def test_a_small_difference_on_every_heart_is_sure_however_much_the_hearts_differ():
-    hearts = np.random.default_rng(5).normal(20, 10, 12)
-    found = standing(table(a=hearts, b=hearts + 0.1 + 0.01 * np.arange(12)), statistic="mean")
-    assert found.loc["a", "high"] > found.loc["b", "low"]
-    assert found.loc["b", "difference"] == pytest.approx(0.155) and found.loc["b", "difference_low"] > 0.1
-    assert list(found["rank_first"]) == [1, 2] == list(found["rank_last"])
-
-
-@pytest.mark.parametrize(("hearts", "last"), [(5, [1, 2]), (4, [2, 2]), (2, [2, 2])])
-def test_nobody_is_surely_first_by_fewer_than_five_hearts(hearts, last):
-    better = np.arange(1.0, 1 + hearts)
-    assert list(standing(table(a=better, b=better + 10))["rank_last"]) == last
-
-
-def test_where_more_is_better_the_largest_is_first_and_intervals_stay_in_order():
-    found = standing(table(a=[1, 2, 3, 4, 2.5], b=[11, 12, 14, 13, 12.5]), descending=True)
-    assert list(found.index) == ["b", "a"] and list(found["value"]) == [12.5, 2.5]
-    assert (found["low"] <= found["value"]).all() and (found["value"] <= found["high"]).all()
-    assert (
-        found.loc["a", "difference"] == -10
-        and found.loc["a", "difference_low"] <= -10 <= found.loc["a", "difference_high"]
-    )
-    assert list(found["rank_last"]) == [1, 2]
-
-
-def test_signed_rank_test_of_six_hearts_that_all_agree_is_two_of_64_and_holm_adjusts_it():
-    hearts = np.arange(6.0)
-    found = standing(table(a=hearts, b=hearts + [1, 2, 3, 4, 5, 6], c=hearts + [2, 4, 6, 8, 10, 12]))
-    np.testing.assert_allclose(found["p_value"], [np.nan, 2 / 32, 2 / 32])
-    pairs = paired(table(a=hearts, b=hearts + [1, 2, 3, 4, 5, 6], c=hearts))
-    np.testing.assert_allclose(pairs["p_value"], [3 / 32, 1, 3 / 32])
-    assert list(zip(pairs["first"], pairs["second"], strict=True)) == [("a", "b"), ("a", "c"), ("b", "c")]
-    assert list(pairs["difference"]) == [-3.5, 0, 3.5] and pairs.loc[0, "high"] < 0 < pairs.loc[2, "low"]
-
-
-def test_one_heart_has_an_order_and_nothing_that_is_sure():
-    found = standing(table(a=[5], b=[4]))
-    assert list(found.index) == ["b", "a"] and list(found["value"]) == [4, 5]
-    assert found[["low", "high", "difference_low", "difference_high", "p_value"]].isna().all(axis=None)
-    assert found[["rank_first", "rank_last"]].to_numpy().tolist() == [[1, 2], [1, 2]]
-
-
-def test_a_tracker_with_a_heart_that_it_does_not_know_is_last_and_has_no_rank():
-    found = standing(table(b=[1, np.nan, 1], a=[5, 6, 7]))
-    assert list(found.index) == ["a", "b"]
-    assert found.loc["b", ["value", "low", "rank_first", "rank_last", "difference"]].isna().all()
-    assert list(found.loc["a", ["rank_first", "rank_last"]]) == [1, 1]
-
-
-def test_no_heart_has_no_value():
-    found = standing(table(a=[], b=[]))
-    assert list(found["hearts"]) == [0, 0] and found["value"].isna().all()
 
 
 def clips(values, **others):

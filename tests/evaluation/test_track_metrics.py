@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.suite.reliability import calibration_error, curve
+from benchmarks.suite.quality import calibration_error, curve
 from echotruth.evaluation.point_tracks import flow_error, median_trajectory_error, survival, tap_vid
 from echotruth.evaluation.reliability import counts, summary
 

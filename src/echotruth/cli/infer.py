@@ -26,8 +26,8 @@ def infer(arguments: argparse.Namespace) -> int:
     four minutes; the key inference.tracker makes it a stage of a run, which keeps the draws and does nothing twice.
 
     examples:
-      echotruth infer out/benchmark --tracker bspline_dic --size 256 --case infarct_inferior_ideal
-      echotruth infer out/benchmark --tracker dis --size 128 --output dis.csv
+      echotruth infer out/demo --tracker bspline_dic --size 256
+      echotruth infer out/hearts --tracker dis --size 128 --output dis.csv
 
     exit status:
       0  all hearts are inferred

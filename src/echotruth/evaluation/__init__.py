@@ -21,7 +21,7 @@ What is read from a repository:
     tracks              points of the grid, tracked and true
     clip_metrics        table of the metrics of all clips
     difficulty          how well a clip can be tracked at all
-    leaderboard         ranks of the trackers over hearts, with intervals (resampling)
+    leaderboard         ranks of the trackers over hearts (paired_ratios), with intervals (resampling)
 
 A tracker from outside, `echotruth evaluate`: run, tracker_options, availability, parallel.
 """

@@ -198,7 +198,7 @@ def _of_view(
         keys: Row = {"size_px": size, "tracker": tracker}
         of_guest = told.pop((size, tracker), {})
         reason = failures.get((tracker, size), str(of_guest.get("failure", "")))
-        clip, segments, steps = _of_clip(found, truth)
+        clip, segments, steps = clip_rows(found, truth)
         yield [{**keys, "failure": reason, **clip}], [keys | row for row in segments], [keys | step for step in steps]
     for (size, tracker), row in told.items():
         if size in sizes and tracker in trackers:
@@ -206,8 +206,16 @@ def _of_view(
             yield [values | _truth_metrics(truth)], [], []
 
 
-def _of_clip(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row]]:
-    """Rows of the three tables of one clip and tracker, less their keys."""
+def clip_rows(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row]]:
+    """Rows of the three tables of one clip and tracker, less their keys.
+
+    Parameters
+    ----------
+    found : dict of ndarray
+        displacement (frame, grid rows, grid columns, 2), m, quality (frame, grid rows, grid columns), and what
+        :func:`.scoring.score` makes of the first.
+    truth : ClipTruth
+    """
     displacement, quality = (found[name][:, truth.inside].astype(float) for name in ("displacement", "quality"))
     displacement /= truth.unit
     within = np.linalg.norm(displacement - truth.displacement[..., :2], axis=-1) < reliability.WITHIN

@@ -1,12 +1,14 @@
-"""Leaderboard of trackers: means over the hearts of a repository, with bootstrap intervals, and ranks.
+"""Leaderboard of trackers: means over the hearts of a repository, with bootstrap intervals, and ranges of ranks.
 
 Of several cases of one heart, the heart has the mean over the clips of all of them.
 
 Trackers are ranked by `nrmse_all_percent`, in which a point without an estimate counts as one that did not move: a
 tracker gains nothing by leaving out difficult points, and one that fails has 100 %. Where every point has an estimate
-it is the NRMSE. A metric that a tracker lacks on one clip is missing from its mean too, since the mean of its other
-clips would be too good. Intervals are the middle 95 % of the means (and ranks) of a bootstrap over hearts (Efron,
-Ann Stat 1979; 7:1), in which all trackers share the resampled hearts. A single heart has no interval.
+it is the NRMSE. Its means are geometric, so that a heart counts by the ratio of two trackers in it and not by how
+difficult it is. Which ranks are possible follows from the ratios (:mod:`.paired_ratios`): equal trackers are ordered in
+5 % of leaderboards at most, and none is with fewer than six hearts. A metric that a tracker lacks on one clip is
+missing from its mean too, since the mean of its other clips would be too good. Intervals of means are the middle 95 %
+of a bootstrap over hearts (:mod:`.resampling`); a single heart has none.
 """
 
 import logging
@@ -17,7 +19,8 @@ import numpy as np
 import pandas as pd
 
 from echotruth.config.imaging import ALL_VIEWS
-from echotruth.evaluation.resampling import draws, interval, means_of_hearts, percentiles, ranks
+from echotruth.evaluation.paired_ratios import log_scores, rank_ranges
+from echotruth.evaluation.resampling import draws, interval, means_of_hearts, ranks
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import estimates, schema
 from echotruth.repository.reader import Repository
@@ -92,11 +95,12 @@ def standings(rows: pd.DataFrame, seed: int, hearts: Mapping[str, str] | None = 
         One row for every image size, view (`all`: the mean over the views of a heart) and tracker, the best first:
         `rank` (equal trackers share one; NaN for a tracker that was not evaluated on every case and view), `hearts`
         and `failures` (number of clips), the mean over the hearts of every metric, NaN where the tracker has no
-        value on a clip on which another tracker has one or it failed, and `_low` and `_high` of the rank, of
-        `nrmse_all_percent` and of the RMS errors of strain: the bootstrap interval, NaN with a single heart and where
-        there is no mean.
+        value on a clip on which another tracker has one or it failed; `rank_low` and `rank_high`, the ranks that are
+        possible; and `_low` and `_high` of `nrmse_all_percent` and of the RMS errors of strain: the bootstrap interval,
+        NaN with a single heart and where there is no mean.
     """
-    rows = rows.assign(**{HEART: rows["case"] if hearts is None else rows["case"].map(hearts)})
+    heart = rows["case"] if hearts is None else rows["case"].map(hearts)
+    rows = rows.assign(**{HEART: heart, RANKED_BY: log_scores(rows[RANKED_BY])})
     cases_of = rows.groupby(HEART, sort=False)["case"].nunique()
     views, resamples = list(dict.fromkeys(rows["view"])), draws(len(cases_of), seed)
     tables = []
@@ -133,11 +137,13 @@ def _table(clips: pd.DataFrame, clips_of: pd.Series, resamples: np.ndarray) -> p
         values = means[name].unstack(HEART).reindex(index=trackers, columns=clips_of.index).to_numpy().T
         if name == RANKED_BY:
             table["rank"] = ranks(values.mean(0))
-            table["rank_low"], table["rank_high"] = percentiles(ranks(values[resamples].mean(1)), len(values))
+            table["rank_low"], table["rank_high"] = rank_ranges(values)
         table[f"{name}_low"], table[f"{name}_high"] = interval(values, resamples)
     by_tracker = means.groupby("tracker", sort=False)
     known_for_all = by_tracker.count().eq(by_tracker.size(), axis=0)
     table = table.join(by_tracker.mean().where(known_for_all))
+    geometric = [f"{RANKED_BY}{end}" for end in ("", "_low", "_high")]
+    table[geometric] = np.exp(table[geometric])
     return table.sort_values("rank", kind="stable", na_position="last").reset_index()
 
 

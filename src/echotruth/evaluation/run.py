@@ -126,17 +126,11 @@ class EvaluationRun:
                 metadata.write(self._draft, about, consolidated=False)
 
     def write(self, rows: list[Row]) -> pd.DataFrame:
-        """Write the scores, and move the motion that is kept beside them; they replace earlier ones of the same name.
-
-        Scores of an earlier evaluation on variants of the clips, NAME.*.json (benchmarks/suite/results.py), are
-        removed: they are not of what was scored.
-        """
+        """Write the scores, and move the motion that is kept beside them; they replace those of the same name."""
         import pandas as pd
 
         table = pd.DataFrame(rows)
         with self._writing():
-            for earlier in self.file.parent.glob(f"{self.name}.*.json"):
-                earlier.unlink()
             shutil.rmtree(store := external_store(self.repository.folder, self.name), ignore_errors=True)
             if self.keep:
                 self._draft.replace(store)

@@ -32,6 +32,12 @@ def curve(table: pd.DataFrame) -> pd.DataFrame:
     return added[[*keys, "count"]].assign(**shares)
 
 
+def stated_and_right(table: pd.DataFrame) -> tuple[float, float, float]:
+    """Stated and observed share of right points, and the calibration error, %; the parameter as below."""
+    stated, right, count = (table[name].sum() for name in ("quality_sum", "within_count", "count"))
+    return 100 * stated / count, 100 * right / count, calibration_error(table)
+
+
 def calibration_error(table: pd.DataFrame) -> float:
     """Expected calibration error (Naeini et al., Proc AAAI 2015; 29, doi 10.1609/aaai.v29i1.9602).
 

@@ -1,0 +1,85 @@
+"""Columns of the tables of scores: a row per case, view, image size and tracker.
+
+Beside those named here there is each metric of a clip, by the names of
+:attr:`echotruth.evaluation.clip_metrics.ClipMetrics.clips` (docs/metrics.md). Segments and steps of quality are columns
+of their own, which :func:`segments` and :func:`reliability` turn into rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pandas as pd
+
+from echotruth.evaluation import reliability as steps
+from echotruth.evaluation import segment_strain
+from echotruth.evaluation.displacement_error import SEGMENTS
+from echotruth.evaluation.segment_strain import Row
+
+IDENTITY = (
+    *("part", "split", "species", "heart", "group", "disease", "acoustics", "variation"),
+    *("case", "view", "size_px", "tracker"),
+)
+"""`split` is develop or test; `species` mouse or human; `group` healthy, infarct, late_activation, hypertrophy or
+dilation; `disease` healthy or diseased; `acoustics` realistic or ideal; `variation` none, motion, shadow or low_rate,
+drawn conditions of realistic clips, which count as the others do."""
+
+ABOUT = ("attempt", "plane", "diagnosis", "ejection_fraction_percent", "failure", "is_closed", "judged_closed", "cpu_s")
+"""`attempt` is the draw that gave a usable heart; `diagnosis` what bounds it (docs/physiology.md), as fresh or dcm;
+`failure` why the tracker found nothing,
+or ""; `is_closed` whether the last frame is followed by the first, and `judged_closed` whether the trackers think so;
+`cpu_s` the CPU time of the tracker."""
+
+HASHES = ("code", "configuration", "images")
+"""Of the code and the configurations of the whole suite, of those of the view with the settings of the tracker, and of
+the images of the clip."""
+
+TEXT = (*(name for name in IDENTITY if name not in ("part", "size_px")), "plane", "diagnosis", "failure", *HASHES)
+
+OF_SEGMENT = segment_strain.COLUMNS[2:]
+"""Columns of a segment and component: those of the long table less `aha` and `component`."""
+
+TANGENTIAL = {"short_axis": "circumferential", "long_axis": "longitudinal"}
+"""Plane -> the component of strain that is kept of its segments."""
+
+
+def packed_segments(rows: Iterable[Row]) -> Row:
+    """Columns of the tangential strain of segments: `NAME_SS`, SS the AHA segment, as `true_es_percent_07`."""
+    return {
+        f"{name}_{int(row['aha']):02d}": row[name]
+        for row in rows
+        if row["component"] != segment_strain.RADIAL
+        for name in OF_SEGMENT
+    }
+
+
+def packed_reliability(rows: Iterable[Row]) -> Row:
+    """Columns of the steps of quality: `NAME_K`, K the step from 0, as `within_count_9`."""
+    return {f"{name}_{step}": row[name] for step, row in enumerate(rows) for name in steps.COUNTS}
+
+
+def segments(table: pd.DataFrame) -> pd.DataFrame:
+    """Segments as rows: columns `IDENTITY`, and those of `ClipMetrics.segments`, of the tangential component.
+
+    Parameters
+    ----------
+    table : DataFrame
+        As :func:`.parts.read_parts` returns it.
+    """
+    found = []
+    for aha in range(1, SEGMENTS + 1):
+        names = {f"{name}_{aha:02d}": name for name in OF_SEGMENT if f"{name}_{aha:02d}" in table}
+        if names:
+            rows = table[[*IDENTITY, *names]].rename(columns=names)
+            found.append(rows.assign(aha=aha, component=table["plane"].map(TANGENTIAL)).dropna(subset=["points"]))
+    return pd.concat(found, ignore_index=True)
+
+
+def reliability(table: pd.DataFrame) -> pd.DataFrame:
+    """Steps of quality as rows: columns `IDENTITY`, and those of `ClipMetrics.reliability`; the parameter as above."""
+    found = []
+    for step in range(steps.BINS):
+        names = {f"{name}_{step}": name for name in steps.COUNTS}
+        rows = table[[*IDENTITY, *names]].rename(columns=names)
+        found.append(rows.assign(quality_low=step / steps.BINS, quality_high=(step + 1) / steps.BINS))
+    return pd.concat(found, ignore_index=True)

@@ -1,0 +1,287 @@
+"""Hearts of the suite and how each is imaged.
+
+Kinds are mixed over the parts. A heart is drawn again, with its next attempt, until it is solved and within the bounds
+of its diagnosis (docs/physiology.md). The ranges of shape and fibres are those of `cases.draw.preset: hearts`
+(docs/cases.md); levels are drawn about those of the realism presets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from functools import cache
+from math import ceil
+from random import Random
+from typing import Any, NamedTuple
+
+import echotruth as et
+from echotruth.cases import Case
+from echotruth.config.cases import HEARTS
+from echotruth.config.diagnosis import bounds_of
+from echotruth.config.merging import merged, nested
+from echotruth.heart import Heart
+from echotruth.mechanics.beat import simulate
+from echotruth.mechanics.bounds import violation
+from echotruth.mechanics.physiology import measured_heart
+from echotruth.repository.datasets import as_stored
+from echotruth.repository.version import settings_hash, version_of
+from echotruth.section import value_of
+
+SEED, HEARTS_OF_PART, ATTEMPTS = 2, 8, 20
+HUMAN_SCALE = 12.5
+"""Length of a human heart over that of a mouse."""
+
+PLAN: dict[tuple[str, str], dict[str, int]] = {
+    ("develop", "mouse"): {"healthy": 3, "infarct": 4, "late_activation": 2, "hypertrophy": 1, "dilation": 2},
+    ("develop", "human"): {"healthy": 1, "infarct": 1, "late_activation": 1, "dilation": 1},
+    ("test", "mouse"): {"healthy": 12, "infarct": 16, "late_activation": 7, "hypertrophy": 6, "dilation": 7},
+    ("test", "human"): {"healthy": 4, "infarct": 5, "late_activation": 3, "hypertrophy": 2, "dilation": 2},
+}
+"""Split and species -> number of hearts of each group. The first two share the parts 1 and 2."""
+
+SETTINGS: dict[str, Any] = {
+    "geometry": {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2},
+    "loop": {"kind": "circulation", "frames": 20},
+    "rf": {"focal_zones": 5, "lines": 192},
+    "probe": {"elements": 64},
+    "bmode": {"size_px": 256, "downsampling": (1, 2)},
+    "views": {"mid": {"plane": "short_axis"}, "long_axis": {"plane": "long_axis"}},
+}
+"""Of every case."""
+
+TRACKERS: dict[str, dict[str, Any]] = {
+    "as_published": {"method": "phase_correlation"},
+    "corrected": {
+        "method": "phase_correlation",
+        "window_px": None,
+        "taper": "hann",
+        "spectral_threshold": 0.01,
+        "reference": "bidirectional",
+    },
+    "window_deformation": {"method": "window_deformation"},
+    "affine_dic": {"method": "affine_dic"},
+    "dis": {"method": "dis"},
+    "dis_fine": {"method": "dis", "preset": "fine"},
+    "bspline_dic": {"method": "bspline_dic"},
+}
+WINDOW_MM = 1.5
+"""Window of `corrected` in a mouse."""
+
+Keys = dict[str, Any]
+"""Dotted key -> value, or a range (tuple) or choices (list) from which it is drawn."""
+
+SHAPE: Keys = {
+    key: tuple(HEARTS[key]["uniform"])
+    for key in ("geometry.scale", "geometry.elongation", "fibres.endo_deg", "fibres.epi_deg")
+} | {"mechanics.active.sheet_share": (0.3, 0.48), "mechanics.active.normal_share": (0.1, 0.22)}
+HEART_RATE = {"mouse": (420, 560), "human": (58, 90)}
+
+
+def _infarct(**keys: Any) -> Keys:
+    return {f"pathology.infarct.{key}": value for key, value in keys.items()}
+
+
+KINDS: dict[str, list[Keys]] = {
+    "healthy": [{}],
+    "infarct": [
+        _infarct(radius_mm=(0.5, 0.8), position=(0.4, 0.6), azimuth_deg=(-180, 180), age="fresh"),
+        _infarct(segments=[[1, 7, 8, 13, 14], [5, 6, 11, 12, 16]], age="fresh", remote_tension_scale=(0.75, 1)),
+        _infarct(segments=[[7, 8, 12], [8, 9, 14], [10, 11, 15]], age="fresh", transmurality=(0.4, 0.6)),
+        _infarct(segments=[[7, 8], [9, 10], [11, 12]], age="old"),
+        _infarct(segments=[[7, 12], [8, 9], [10, 11]], tension_scale=(0.3, 0.7), stiffness_scale=(1, 3)),
+        _infarct(segments=[[13, 14, 15, 16, 17], [8, 9, 14, 17]], age="old", border_mm=(0, 0.3)),
+        _infarct(segments=[[7, 8, 13], [9, 10, 15], [11, 12, 16]], age="fresh", border_mm=(0.1, 0.4)),
+        _infarct(segments=[[7, 8, 12, 13, 14], [4, 9, 10, 11, 15]], age="old"),
+    ],
+    "late_activation": [
+        {"pathology.activation.preset": "lbbb"},
+        {"pathology.activation.preset": "rv_pacing"},
+        {"pathology.activation.sites": [[{"position": 0.5, "azimuth_deg": 180, "depth": 1}]]},
+    ],
+    "hypertrophy": [
+        {"pathology.preset": "hypertension"},
+        {"geometry.hypertrophy": (1.1, 1.3), "loop.circulation.resistance": (1.1, 1.4)},
+    ],
+    "dilation": [
+        {"pathology.preset": "dcm"},
+        {"geometry.dilation": (1.03, 1.1), "loop.circulation.contractility": (0.6, 0.85)},
+    ],
+}
+"""Group -> keys of its kinds, which take turns; lengths are those of a mouse."""
+
+POSE: Keys = {
+    "views.mid.position": (0.44, 0.56),
+    "views.mid.angle_deg": (-15, 15),
+    "views.long_axis.rotation_deg": (15, 45),
+    "views.long_axis.angle_deg": (-10, 10),
+}
+LOOK: Keys = {
+    "probe.attenuation_dB_per_cm_MHz": (-0.06, 0.06),
+    "realism.backscatter.anisotropy_dB": (-3, 3),
+    "realism.borders.endocardium_dB": (-3, 3),
+    "realism.borders.epicardium_dB": (-3, 3),
+    "realism.blood.level_dB": (-3, 4),
+    "realism.surroundings.level_dB": (-3, 2),
+    "realism.noise.snr_dB": (-8, 4),
+    "realism.haze.level_dB": (-3, 3),
+    "bmode.dynamic_range_dB": (-3, 5),
+    "bmode.gain_dB": (-2, 3),
+    "bmode.grey_gamma": (-0.4, 0.1),
+}
+"""What is added to the levels of the preset."""
+
+MOTIONS: list[Keys] = [
+    {"rocking_deg": (-4, 4)},
+    {"drift.lateral_mm": (-0.25, 0.25), "drift.axial_mm": (-0.2, 0.2), "drift.elevation_mm": (-0.15, 0.15)},
+    {"breathing.axial_mm": (0.3, 0.6), "breathing.elevation_mm": (0, 0.3), "breathing.phase_deg": (0, 360)},
+]
+SHADOW = {
+    "mouse": {"side": ["left", "right"], "edge_deg": (12, 22), "edge_width_mm": 0.8, "level_dB": (-30, -10)},
+    "human": {"edge_deg": (10, 16), "level_dB": (-20, -10)},
+}
+"""A rib; people have a faint one at the right by their preset."""
+
+
+class SuiteCase(NamedTuple):
+    """A case, and what sorts it.
+
+    Attributes
+    ----------
+    case : Case
+    sorts : dict
+        The columns of :data:`.columns.IDENTITY` that do not depend on the clip.
+    """
+
+    case: Case
+    sorts: dict[str, Any]
+
+
+def cases_of(row: Mapping[str, Any], attempt: int, trackers: dict[str, Any] | None = None) -> list[SuiteCase]:
+    """The realistic case of a heart, and its ideal one if it has one.
+
+    Parameters
+    ----------
+    row : mapping
+        Of the plan.
+    attempt : int
+        That gives the heart.
+    trackers : dict, optional
+        By name, as in a configuration. Default: those of the suite.
+    """
+    names = ("realistic", "ideal") if row["condition"] == "ideal" else ("realistic",)
+    motion = motion_keys(row, attempt)
+    return [_case(row, acoustics, motion, trackers) for acoustics in names]
+
+
+def _case(row: Mapping[str, Any], acoustics: str, motion: Keys, trackers: dict[str, Any] | None) -> SuiteCase:
+    name, condition = f"{row['heart']}_{acoustics}", row["condition"].replace("ideal", "none")
+    random = Random(f"{SEED} {row['heart']} images")
+    keys = motion | {"name": name, "seed": random.randrange(1, 10**6)} | drawn(POSE, random)
+    keys["realism.preset"] = row["species"] if acoustics == "realistic" else "none"
+    config = _configured(row["species"], keys, trackers)
+    if acoustics == "realistic":
+        keys |= {key: round(value_of(config, key) + more, 4) for key, more in drawn(LOOK, random).items()}
+        config = _configured(row["species"], keys | _condition(row["species"], condition, random), trackers)
+    (case,) = et.expand(config)
+    disease = "healthy" if row["group"] == "healthy" else "diseased"
+    sorts = {key: row[key] for key in ("part", "split", "species", "heart", "group")}
+    return SuiteCase(case, sorts | {"disease": disease, "acoustics": acoustics, "variation": condition, "case": name})
+
+
+def _condition(species: str, condition: str, random: Random) -> Keys:
+    """Keys of a condition of imaging."""
+    if condition == "motion":
+        motion = _scaled(species, drawn(random.choice(MOTIONS), random))
+        return {f"views.{view}.motion.{key}": value for view in SETTINGS["views"] for key, value in motion.items()}
+    if condition == "shadow":
+        return {f"realism.shadow.{key}": value for key, value in drawn(SHADOW[species], random).items()}
+    return {"tracking.frame_step": 2} if condition == "low_rate" else {}
+
+
+def _configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None) -> et.Config:
+    corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
+    settings = SETTINGS | {"tracking": {"grid_px": 4, "trackers": trackers or TRACKERS | {"corrected": corrected}}}
+    return et.configure(merged(settings, nested({"geometry.preset": species} | keys), whole=()))
+
+
+def drawn(keys: Keys, random: Random) -> Keys:
+    """Values of keys: ranges and choices are drawn from, others stay."""
+    return {key: _drawn(value, random) for key, value in keys.items()}
+
+
+def _drawn(value: Any, random: Random) -> Any:
+    if isinstance(value, tuple):
+        return float(f"{random.uniform(*value):.4g}")
+    return random.choice(value) if isinstance(value, list) else value
+
+
+def _scaled(species: str, keys: Keys) -> Keys:
+    """Lengths of a mouse as those of a species."""
+    factor = HUMAN_SCALE if species == "human" else 1
+    return {key: round(factor * value, 4) if key.endswith("_mm") else value for key, value in keys.items()}
+
+
+def plan() -> list[dict[str, Any]]:
+    """Hearts, a row each: part, split, species, heart, group, kind and condition."""
+    blocks = [[("develop", "mouse"), ("develop", "human")], [("test", "mouse")], [("test", "human")]]
+    rows: list[dict[str, Any]] = []
+    for block in blocks:
+        of_block = [row for key in block for row in _planned(*key)]
+        of_block.sort(key=lambda row: row.pop("place"))
+        parts, first = ceil(len(of_block) / HEARTS_OF_PART), rows[-1]["part"] + 1 if rows else 1
+        rows += [{"part": first + k * parts // len(of_block)} | row for k, row in enumerate(of_block)]
+    return rows
+
+
+def _planned(split: str, species: str) -> Iterable[dict[str, Any]]:
+    """Hearts of a split and species; `place` spreads those of each group evenly from 0 to 1."""
+    groups = PLAN[split, species]
+    number = sum(groups.values())
+    counts = {"motion": number // 4, "shadow": number // 4, "low_rate": number // 8, "ideal": ceil(number / 5)}
+    counts["none"] = number - sum(counts.values())
+    random = Random(f"{SEED} {split} {species}")
+    # Each condition is spread over the groups, but not over the same kinds of them.
+    spread = sorted(((k + random.random()) / count, name) for name, count in counts.items() for k in range(count))
+    conditions = [name for _, name in spread]
+    first = 1 + (sum(PLAN["develop", species].values()) if split == "test" else 0)
+    for group, count in groups.items():
+        for k in range(count):
+            heart = f"{species}{first:02d}"
+            kind = k % len(KINDS[group])
+            row = {"split": split, "species": species, "heart": heart, "group": group, "kind": kind}
+            yield row | {"condition": conditions.pop(0), "place": (k + 0.5) / count}
+            first += 1
+
+
+@cache
+def suite_version() -> str:
+    """Hash of the code that decides the numbers, and of the configurations of all hearts at their first attempt."""
+    configs = [one.case.config for row in plan() for one in cases_of(row, 1)]
+    return settings_hash(*(version_of("tracking", config, view) for config in configs for view in config.views))
+
+
+def motion_keys(row: Mapping[str, Any], attempt: int) -> Keys:
+    """Keys on which the motion of a heart depends, in one attempt to draw it."""
+    keys = SHAPE | {"loop.heart_rate_per_min": HEART_RATE[row["species"]]} | KINDS[row["group"]][row["kind"]]
+    return _scaled(row["species"], drawn(keys, Random(f"{SEED} {row['heart']} {attempt}")))
+
+
+def usable_heart(row: Mapping[str, Any]) -> tuple[int, Heart]:
+    """The first attempt that gives a heart within the bounds of its diagnosis, and the heart, as a repository has it.
+
+    Raises
+    ------
+    ValueError
+        If none of `ATTEMPTS` does.
+    """
+    reasons = []
+    for attempt in range(1, ATTEMPTS + 1):
+        config = _configured(row["species"], motion_keys(row, attempt))
+        try:
+            arrays = simulate(config)
+            arrays["physiology"], bounded = measured_heart(arrays, config)
+            reasons.append(violation(bounded, bounds_of(config)))
+        except ValueError as error:  # of which all refusals of a heart are kinds
+            reasons.append(str(error))
+        if not reasons[-1]:
+            return attempt, Heart.of(as_stored(Case("heart", {}, config), arrays), config)
+    raise ValueError(f"{row['heart']}: no attempt is usable ({'; '.join(reasons)}): narrow the ranges of its kind")
