@@ -3,8 +3,8 @@
     python benchmarks/tracker_errors.py out/inference                  # the table of the package
     python benchmarks/tracker_errors.py out/mine --all -o errors.csv   # one of hearts and trackers of your own
 
-Only hearts whose label `split` is `develop` count; with --all those of every finished case. Rows of other hearts stay in
-a table that is there.
+Only hearts whose label `split` is `develop` count; with --all those of every finished case. Rows of other hearts stay
+in a table that is there.
 """
 
 from __future__ import annotations

@@ -24,11 +24,10 @@ IDENTITY = (
 dilation; `disease` healthy or diseased; `acoustics` realistic or ideal; `variation` none, motion, shadow or low_rate,
 drawn conditions of realistic clips, which count as the others do."""
 
-ABOUT = ("attempt", "plane", "diagnosis", "ejection_fraction_percent", "failure", "is_closed", "judged_closed", "cpu_s")
+ABOUT = ("attempt", "plane", "diagnosis", "ejection_fraction_percent", "failure", "is_closed", "judged_closed")
 """`attempt` is the draw that gave a usable heart; `diagnosis` what bounds it (docs/physiology.md), as fresh or dcm;
-`failure` why the tracker found nothing,
-or ""; `is_closed` whether the last frame is followed by the first, and `judged_closed` whether the trackers think so;
-`cpu_s` the CPU time of the tracker."""
+`failure` why the tracker found nothing, or ""; `is_closed` whether the last frame is followed by the first, and
+`judged_closed` whether the trackers think so."""
 
 HASHES = ("code", "configuration", "images")
 """Of the code and the configurations of the whole suite, of those of the view with the settings of the tracker, and of

@@ -70,9 +70,8 @@ Keys = dict[str, Any]
 """Dotted key -> value, or a range (tuple) or choices (list) from which it is drawn."""
 
 SHAPE: Keys = {
-    key: tuple(HEARTS[key]["uniform"])
-    for key in ("geometry.scale", "geometry.elongation", "fibres.endo_deg", "fibres.epi_deg")
-} | {"mechanics.active.sheet_share": (0.3, 0.48), "mechanics.active.normal_share": (0.1, 0.22)}
+    key: tuple(given["uniform"]) for key, given in HEARTS.items() if "uniform" in given and not key.startswith("loop.")
+}
 HEART_RATE = {"mouse": (420, 560), "human": (58, 90)}
 
 
@@ -142,14 +141,7 @@ SHADOW = {
 
 
 class SuiteCase(NamedTuple):
-    """A case, and what sorts it.
-
-    Attributes
-    ----------
-    case : Case
-    sorts : dict
-        The columns of :data:`.columns.IDENTITY` that do not depend on the clip.
-    """
+    """A case, and the columns of :data:`.columns.IDENTITY` that do not depend on the clip."""
 
     case: Case
     sorts: dict[str, Any]

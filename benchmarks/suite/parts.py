@@ -124,11 +124,9 @@ def _kept(trackers: dict[str, Any] | None, heart: dict[str, Any]) -> list[Row]:
     path = SCRATCH / suite_version() / f"{heart['heart']}.json"
     if trackers is not None:
         return heart_rows(heart, trackers)
-    if path.is_file():
-        return json.loads(path.read_text(encoding="utf-8"))
-    rows = heart_rows(heart)
-    files.write(path, json.dumps(rows, default=lambda value: value.item()).encode())
-    return rows
+    if not path.is_file():
+        files.write(path, json.dumps(heart_rows(heart), default=lambda value: value.item()).encode())
+    return json.loads(path.read_text(encoding="utf-8"))
 
 
 def _check_images(table: pd.DataFrame, before: pd.DataFrame) -> None:
