@@ -3,6 +3,7 @@
     python -m benchmarks.suite part 1 --jobs 2
     python -m benchmarks.suite part small
     python -m benchmarks.suite part 1 --tracker mine.yaml
+    python -m benchmarks.suite page
 
 The exit status is 0 if it is done, and 2 if it cannot be done.
 """
@@ -14,7 +15,8 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from .parts import SMALL, make_part
+from . import page
+from .parts import SMALL, make_part, read_parts
 
 PROGRAM = "python -m benchmarks.suite"
 
@@ -24,18 +26,30 @@ def parser() -> argparse.ArgumentParser:
     whole = argparse.ArgumentParser(
         prog=PROGRAM, description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    part = whole.add_subparsers(dest="command", required=True).add_parser("part", help="make eight hearts and score")
-    part.add_argument("part", type=lambda text: SMALL if text == "small" else int(text), help="its number, or small")
+    commands = whole.add_subparsers(dest="command", required=True)
+    part = commands.add_parser("part", help="make eight hearts and score")
+    part.add_argument("part", type=number, help="its number, or small")
     part.add_argument("--jobs", type=int, default=1, help="processes (default: 1); scores do not depend on it")
     part.add_argument("--tracker", type=Path, help="YAML file of further trackers, whose scores go beside the part")
+    table = commands.add_parser("page", help="write the page, from the parts alone")
+    table.add_argument("--split", choices=("develop", "test"), default="test", help="hearts to report (default: test)")
+    table.add_argument("--page", type=Path, default=Path("docs/benchmark.md"), help="file (default: %(default)s)")
     return whole
+
+
+def number(part: str) -> int:
+    """Number of a part that is given by its number or as `small`."""
+    return SMALL if part == "small" else int(part)
 
 
 def main() -> int:
     """Do what the command line asks for; the exit status."""
     given = parser().parse_args()
     try:
-        print(make_part(given.part, given.jobs, given.tracker, partial(print, flush=True)))
+        if given.command == "page":
+            print(page.write(read_parts(), given.page, given.split))
+        else:
+            print(make_part(given.part, given.jobs, given.tracker, partial(print, flush=True)))
     except (ValueError, OSError) as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2

@@ -1,11 +1,10 @@
 """Page of the suite, docs/benchmark.md: its tables, from the parts alone.
 
-python -m benchmarks.suite.page --split develop
+python -m benchmarks.suite page --split develop
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from echotruth.evaluation.paired_ratios import LEAST_HEARTS
 from . import charts, columns, power, quality
 from .comparison import against, by_heart, deviation, ranking, scores
 from .detection import detection, recovery
-from .parts import FOLDER, read_parts
+from .parts import FOLDER
 
 REFERENCE = "bspline_dic"
 """Tracker with which others are compared in people, who are few."""
@@ -289,11 +288,3 @@ def _area(table: pd.DataFrame, name: str) -> str:
     if name not in table.index or not np.isfinite(table.at[name, "auc"]):
         return NONE
     return "{} ({}–{})".format(*(number(table.at[name, column], 2) for column in ("auc", "low", "high")))
-
-
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.suite.page")
-    parser.add_argument("--split", choices=("develop", "test"), default="test", help="hearts to report (default: test)")
-    parser.add_argument("--page", type=Path, default=Path("docs/benchmark.md"), help="file (default: %(default)s)")
-    given = parser.parse_args()
-    print(write(read_parts(), given.page, given.split))
