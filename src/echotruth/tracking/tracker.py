@@ -11,6 +11,7 @@ from echotruth.tracking import trackers
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.quality import error_model
+from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker_input import TrackerInput
 
 
@@ -79,7 +80,8 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         return trackers.function("external")(clip, settings)
     with explained(f"the tracker {settings.method}"):
         path = tracked_path(clip, settings)
-    return path.displacement, error_model(settings).probability(path, clip.shape)
+    speckle = speckle_length(clip.frames[0], clip.mask)
+    return path.displacement, error_model(settings).probability(path, speckle, clip.shape)
 
 
 def tracked_path(clip: TrackerInput, settings: Any) -> Path:
