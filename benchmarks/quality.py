@@ -31,7 +31,7 @@ from echotruth.tracking.tracker_input import TrackerInput
 RESULTS = Path(__file__).parent / "results" / "quality.md"
 EVERY = 13
 """Every n-th value of a clip is used; neighbours in time and place hardly differ."""
-START, LOWEST, HIGHEST = (0.2, 4.0, 0.1, 0.2, 0.04, 0.1), 1e-3, 50.0
+START, LOWEST, HIGHEST = (0.2, 4.0, 0.2, 0.2, 0.04, 0.1), 1e-3, 50.0
 """Constants at which the fit starts, in the order of `ErrorModel`, and their bounds."""
 NEGLIGIBLE = 2e-3
 SURE = 1e-6
@@ -132,7 +132,9 @@ def fitted(given: list[Sample]) -> quality.ErrorModel:
 
     bounds = [(np.log(LOWEST), np.log(HIGHEST))] * len(START)
     best = np.exp(minimize(loss, np.log(START), method="L-BFGS-B", bounds=bounds).x)
-    used = np.array([True, True, True, terms.disagreement.any(), True, terms.unseen.any()]) & (best > NEGLIGIBLE)
+    used = np.array([True, True, *[bool(terms.disagreement.any())] * 2, True, bool(terms.unseen.any())]) & (
+        best > NEGLIGIBLE
+    )
     return quality.ErrorModel(*(float(f"{value:.3g}") if kept else 0.0 for value, kept in zip(best, used, strict=True)))
 
 

@@ -11,7 +11,7 @@ from echotruth.tracking.accumulation import Path
 from echotruth.tracking.quality import ERRORS, ErrorModel, error_model, within
 from echotruth.tracking.speckle import speckle_length
 
-MODEL = ErrorModel(speckle=0.3, limit=2.0, pixel=0.2, disagreement=0.6, motion=0.05)
+MODEL = ErrorModel(speckle=0.3, limit=2.0, disagreement=0.6, wall=0.2, motion=0.05)
 SPECKLE = 1.5
 
 
@@ -32,7 +32,7 @@ def test_points_with_the_stated_probability_are_within_the_distance_that_often()
     """A million errors in an image of 64 x 128 px, where 1/256 of the side is half a pixel."""
     random, count = np.random.default_rng(1), 1_000_000
     side = 256 / 128
-    squared = (0.3 * SPECKLE * side) ** 2 / (1 / 0.4 + 1 / 2) + (0.2 * side) ** 2 + (0.6 * side * 0.2) ** 2
+    squared = (0.3 * SPECKLE * side) ** 2 / (1 / 0.4 + 1 / 2) + (0.6**2 + 0.2**2) * (side * 0.2) ** 2
     error = np.sqrt(squared + (0.05 * side * 5) ** 2) * random.standard_normal((2, count))
     quality = MODEL.probability(path(0.4, 0.2), SPECKLE, (64, 128))[1, 0]
     assert abs(np.mean(np.hypot(*error) < 1) - quality) < 4 * np.sqrt(quality * (1 - quality) / count)
@@ -52,8 +52,15 @@ def test_one_way_alone_has_no_disagreement_and_two_cannot_disagree_by_more_than_
     assert far[1, 0] == farther[1, 0] < none[1, 0]
 
 
+def test_point_is_less_sure_where_the_ways_of_others_differ():
+    moved, ones = np.full((2, 3, 2), 3.0), np.ones((2, 3))
+    apart = np.array([[0, 0, 0], [0.4, 0.4, np.nan]]), np.array([[0, 0, 0], [0.4, 3.0, np.nan]])
+    alike, unlike = (MODEL.probability(Path(moved, ones, 0.1 * ones, d), SPECKLE, (256, 256))[1] for d in apart)
+    assert unlike[0] < alike[0] and unlike[2] < alike[2]
+
+
 def test_where_images_are_not_alike_the_prior_limits_the_error():
-    limit = (0.3 * SPECKLE) ** 2 * 2 + 0.2**2 + (0.05 * 5) ** 2
+    limit = (0.3 * SPECKLE) ** 2 * 2 + (0.05 * 5) ** 2
     lost = MODEL.probability(path(np.inf), SPECKLE, (256, 256))[1, 0]
     assert lost == pytest.approx(within(1.0, np.array(limit)))
     assert MODEL.probability(path(1e6), SPECKLE, (256, 256))[1, 0] == pytest.approx(lost, rel=1e-5)

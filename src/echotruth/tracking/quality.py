@@ -23,27 +23,27 @@ class ErrorModel:
     """Distribution of the error of a tracker; lengths are in units of 1/256 of the longer side of the image.
 
     The variance s^2 of each coordinate of the error, with the correlation length l of the speckle
-    (:mod:`echotruth.tracking.speckle`), the side h of a pixel, the variance V of
-    :class:`echotruth.tracking.accumulation.Path`, the disagreement d and the tracked displacement u, is
+    (:mod:`echotruth.tracking.speckle`), the variance V of :class:`echotruth.tracking.accumulation.Path`, the tracked
+    displacement u and the disagreement d, which is u at most, is
 
-        s^2 = (speckle l)^2 V / (1 + V / limit) + (pixel h)^2 + (disagreement min(d, u))^2 + (motion u)^2
-            + (unseen q u)^2,
+        s^2 = (speckle l)^2 V / (1 + V / limit) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2,
 
-    where q, from 0 to 1, is how far the point is not seen in the image. V l^2 is the variance of the places of speckle.
-    It counts in full where images are alike. Where they are not, the tracker relies on what it expects of the motion,
-    as a smooth one: with that as prior the variance is the noise's times the prior's over their sum. Two ways that are
-    farther apart than the point has moved do not say that it is farther off.
+    where D is the RMS of d over the points in the frame, and q, from 0 to 1, how far the point is not seen in the
+    image. V l^2 is the variance of the places of speckle. It counts in full where images are alike. Where they are not,
+    the tracker relies on what it expects of the motion, as a smooth one: with that as prior the variance is the noise's
+    times the prior's over their sum. The two ways err together at many a point, but not at all of them, so that D tells
+    more than d. Two ways that are farther apart than the point has moved do not say that it is farther off.
 
     Attributes
     ----------
-    speckle, limit, pixel, disagreement, motion, unseen : float
+    speckle, limit, disagreement, wall, motion, unseen : float
         See above.
     """
 
     speckle: float
     limit: float
-    pixel: float
     disagreement: float
+    wall: float
     motion: float
     unseen: float = 0.0
 
@@ -73,8 +73,8 @@ class ErrorModel:
         """s^2 of points, in squares of 1/256 of the longer side of the image; the shape is that of the terms."""
         v = terms.variance
         noise = np.divide(v, 1 + v / self.limit, out=np.full_like(v, self.limit), where=np.isfinite(v))
-        expected = self.speckle**2 * terms.speckle * noise + self.pixel**2 * terms.pixel
-        expected += self.disagreement**2 * terms.disagreement
+        expected = self.speckle**2 * terms.speckle * noise
+        expected += self.disagreement**2 * terms.disagreement + self.wall**2 * terms.wall
         return expected + (self.motion**2 + self.unseen**2 * terms.unseen) * terms.motion
 
 
@@ -86,18 +86,18 @@ class Squares:
     ----------
     variance : ndarray of shape (frame, n)
         V, a number.
-    speckle, pixel : float
-        l^2 and h^2.
-    disagreement, motion : ndarray of shape (frame, n)
-        min(d, u)^2, 0 where there is one way only, and u^2.
+    speckle : float
+        l^2.
+    disagreement, wall, motion : ndarray of shape (frame, n)
+        d^2, 0 where there is one way only, D^2, which is the same for all points of a frame, and u^2.
     unseen : ndarray of shape (frame, n)
         q^2, a number.
     """
 
     variance: np.ndarray
     speckle: float | np.ndarray
-    pixel: float | np.ndarray
     disagreement: np.ndarray
+    wall: np.ndarray
     motion: np.ndarray
     unseen: np.ndarray
 
@@ -106,19 +106,21 @@ def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
     """Terms of :class:`ErrorModel` for a path, with the arguments of :meth:`ErrorModel.probability`."""
     side = 1 / (IMAGE_FRACTION * max(shape))  # of a pixel
     moved = side * np.hypot(*np.moveaxis(path.displacement, -1, 0))
-    apart = np.minimum(side * np.nan_to_num(path.disagreement, nan=0.0), moved)
+    apart = np.minimum(side * np.nan_to_num(path.disagreement, nan=0.0), np.nan_to_num(moved)) ** 2
+    known = np.isfinite(moved).sum(1, keepdims=True)
+    wall = np.broadcast_to(apart.sum(1, keepdims=True) / np.maximum(known, 1), apart.shape)
     unseen = np.zeros_like(moved) if path.unseen is None else path.unseen
-    return Squares(path.variance, (speckle * side) ** 2, side**2, apart**2, moved**2, unseen**2)
+    return Squares(path.variance, (speckle * side) ** 2, apart, wall, moved**2, unseen**2)
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.2, 4.0, 0.1, 0.2, 0.03),
-    "phase_correlation": ErrorModel(0.2, 4.0, 0.1, 0.2, 0.03),
-    "window_deformation": ErrorModel(0.2, 4.0, 0.1, 0.2, 0.03),
-    "affine_dic": ErrorModel(0.2, 4.0, 0.1, 0.2, 0.03),
+    "phase_correlation_ED": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
+    "phase_correlation": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
+    "window_deformation": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
+    "affine_dic": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
     "dis": ErrorModel(0.28, 4.0, 0.1, 0.26, 0.05),
-    "dis_fine": ErrorModel(0.2, 4.0, 0.1, 0.2, 0.03),
-    "ilk": ErrorModel(0.2, 4.0, 0.1, 0.2, 0.03),
+    "dis_fine": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
+    "ilk": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
     "bspline_dic": ErrorModel(0.137, 4.0, 0.08, 0.23, 0.035, 0.17),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
