@@ -11,16 +11,18 @@ The page is of all other hearts. A condition is the label `condition` of a case.
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass, fields, replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import report
+from noise_sector import CENTRE_DEG, shadowed
 from scipy import ndimage
 from scipy.optimize import minimize
 
 from echotruth.cases import Case
-from echotruth.evaluation.clip import Clip, read_clips
+from echotruth.evaluation.clip import read_clips
 from echotruth.evaluation.scoring import read_truth
 from echotruth.repository.reader import Repository
 from echotruth.tracking import accumulation, quality
@@ -33,13 +35,10 @@ EVERY = 13
 """Every n-th value of a clip is used; neighbours in time and place hardly differ."""
 START, LOWEST, HIGHEST = (0.2, 4.0, 0.2, 0.2, 0.04, 0.1), 1e-3, 50.0
 """Constants at which the fit starts, in the order of `ErrorModel`, and their bounds."""
+NAMES = tuple(each.name for each in fields(quality.ErrorModel))
 NEGLIGIBLE = 2e-3
 SURE = 1e-6
 """Distance of a probability from 0 and 1, lest one point outweighs all others."""
-WIDTH_DEG, LOSS_DB, NOISE_DB, DYNAMIC_RANGE_DB = 10.0, 40.0, -35.0, 55.0
-CENTRE_DEG = {"short_axis": -12.0, "long_axis": 8.0}
-GRAIN = 1.2 / 512, 3.0 / 512
-"""Standard deviation of the blur of the noise, axial and lateral, over the side of the image."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +53,12 @@ class Sample:
     near: np.ndarray
 
 
-def sample(where: tuple[str, str, int, str], speckle: float, path: accumulation.Path, true: np.ndarray, counts=True):
+def sample(where: tuple[str, str, int, str], speckle: float, path: accumulation.Path, true: np.ndarray, counts):
     """Sample of a tracked clip; `where` are the first fields, `true` is the displacement (frame, n, 2), px."""
-    shape = (where[2], where[2])
     error = np.hypot(*np.moveaxis(path.displacement - true, -1, 0)) / (quality.IMAGE_FRACTION * where[2])
     chosen = np.isfinite(error) & counts
     chosen[0] = False
-    terms = quality.squares(path, speckle, shape)
+    terms = quality.squares(path, speckle, (where[2], where[2]))
     values = (np.broadcast_to(getattr(terms, each.name), error.shape)[chosen][::EVERY] for each in fields(terms))
     return Sample(*where, quality.Squares(*values), error[chosen][::EVERY] < 1)
 
@@ -81,61 +79,45 @@ def samples_of_view(repository: Repository, case: Case, view: str) -> Iterator[S
     """Samples of the clips of one view of a case, in three conditions."""
     true, plane = read_truth(repository, case.id, view).displacement, case.config.views[view].plane
     condition = str(case.labels.get("condition", "plain"))
+    trackers = [tracker for tracker in case.config.tracking.trackers.values() if tracker.method != "external"]
     for size, clip in read_clips(repository, case.id, view).items():
-        displacement = true / clip.spacing
+        displacement, speckle = true / clip.spacing, speckle_length(clip.frames[0], clip.mask)
         noisy, inside = shadowed(clip.frames, CENTRE_DEG[plane])
         place = np.moveaxis(clip.points + displacement, -1, 0)[::-1]
         hidden = ndimage.map_coordinates(inside, place, order=1, mode="nearest") > 0.5
-        speckle = speckle_length(clip.frames[0], clip.mask)
-        for tracker in case.config.tracking.trackers.values():
-            if tracker.method == "external":
-                continue
-            rest = plane, size, quality.error_name(tracker)
-            for step, name in ((1, condition), (2, "low rate")):
-                path = tracked(clip, clip.frames[::step], clip.frame_time[::step], tracker)
-                yield sample((name, *rest), speckle, path, displacement[::step])
-            path = tracked(clip, noisy, clip.frame_time, tracker)
-            yield sample(("noise", *rest), speckle, path, displacement, hidden)
-
-
-def tracked(clip: Clip, frames: np.ndarray, times: np.ndarray, tracker) -> accumulation.Path:
-    """Path of the points of a clip by a tracker, in these frames and times in place of its own."""
-    return tracked_path(TrackerInput(frames, clip.points, clip.mask, clip.spacing, times, clip.seed), tracker)
-
-
-def shadowed(frames: np.ndarray, centre_deg: float) -> tuple[np.ndarray, np.ndarray]:
-    """Clip (frame, axial, lateral) with noise in a sector, and how far each pixel is in it, (axial, lateral)."""
-    size = frames.shape[-1]
-    row, column = np.indices((size, size))
-    angle = np.degrees(np.arctan2(column - (size - 1) / 2, row + 0.5))
-    inside = 1 / (1 + np.exp((np.abs(angle - centre_deg) - WIDTH_DEG / 2) / 0.15))
-    random = np.random.default_rng(0)
-    blur = (0, *(max(0.5, share * size) for share in GRAIN))
-    noise = np.array([np.hypot(*ndimage.gaussian_filter(random.normal(size=(2, size, size)), blur)) for _ in frames])
-    noise *= 10 ** (NOISE_DB / 20) / np.sqrt(np.mean(noise**2))
-    amplitude = np.where(frames > 0, 10 ** ((frames / 255 - 1) * DYNAMIC_RANGE_DB / 20), 0)
-    seen = amplitude * 10 ** (-LOSS_DB / 20 * inside) + noise * inside
-    grey = 255 * (1 + 20 * np.log10(np.maximum(seen, 1e-9)) / DYNAMIC_RANGE_DB)
-    return np.clip(np.round(grey), 0, 255).astype(np.uint8), inside
+        every = np.ones_like(hidden)
+        ways = (condition, clip.frames, 1, every), ("low rate", clip.frames, 2, every), ("noise", noisy, 1, hidden)
+        for tracker, (name, frames, step, counts) in product(trackers, ways):
+            given = frames[::step], *clip.tracker_arguments[1:4], clip.frame_time[::step], clip.seed
+            path = tracked_path(TrackerInput(*given), tracker)
+            where = name, plane, size, quality.error_name(tracker)
+            yield sample(where, speckle, path, displacement[::step], counts[::step])
 
 
 def fitted(given: list[Sample]) -> quality.ErrorModel:
-    """Constants of the greatest likelihood; those that are negligible are 0."""
+    """Constants of clips without noise; the last one, `unseen`, of clips in which a tracker finds tissue hidden."""
+    hidden = [one for one in given if one.terms.unseen.any()]
+    clear = [one for one in given if one.condition != "noise" and len(one.near)]
+    model = likeliest(clear, quality.ErrorModel(*START), NAMES)
+    return likeliest(hidden, model, NAMES[-1:]) if hidden else replace(model, unseen=0.0)
+
+
+def likeliest(given: list[Sample], start: quality.ErrorModel, names: tuple[str, ...]) -> quality.ErrorModel:
+    """Constants of these names with the greatest likelihood; those that are negligible are 0."""
     columns = ([getattr(one.terms, each.name) for one in given] for each in fields(quality.Squares))
     terms, near = quality.Squares(*map(np.concatenate, columns)), np.concatenate([one.near for one in given])
-    weight = np.concatenate([np.full(len(one.near), 1 / max(1, len(one.near))) for one in given])
+    weight = np.concatenate([np.full(len(one.near), 1 / len(one.near)) for one in given])
 
     def loss(logarithms: np.ndarray) -> float:
-        stated = quality.within(1.0, quality.ErrorModel(*np.exp(logarithms)).variance(terms))
-        stated = np.clip(stated, SURE, 1 - SURE)
+        model = replace(start, **dict(zip(names, np.exp(logarithms), strict=True)))
+        stated = np.clip(quality.within(1.0, model.variance(terms)), SURE, 1 - SURE)
         return float(-np.average(np.where(near, np.log(stated), np.log1p(-stated)), weights=weight))
 
-    bounds = [(np.log(LOWEST), np.log(HIGHEST))] * len(START)
-    best = np.exp(minimize(loss, np.log(START), method="L-BFGS-B", bounds=bounds).x)
-    used = np.array([True, True, *[bool(terms.disagreement.any())] * 2, True, bool(terms.unseen.any())]) & (
-        best > NEGLIGIBLE
-    )
-    return quality.ErrorModel(*(float(f"{value:.3g}") if kept else 0.0 for value, kept in zip(best, used, strict=True)))
+    begin, bounds = [np.log(getattr(start, name)) for name in names], [(np.log(LOWEST), np.log(HIGHEST))] * len(names)
+    best = np.exp(minimize(loss, begin, method="L-BFGS-B", bounds=bounds).x)
+    idle = () if terms.disagreement.any() else ("disagreement", "wall")
+    kept = {name: value * (value > NEGLIGIBLE and name not in idle) for name, value in zip(names, best, strict=True)}
+    return replace(start, **{name: float(f"{value:.3g}") for name, value in kept.items()})
 
 
 def page(given: list[Sample]) -> list[str]:
@@ -159,7 +141,7 @@ def main() -> None:
         RESULTS.write_text("\n".join(["# Is the quality the probability that it states?", "", *page(found), ""]))
     for name in dict.fromkeys(one.tracker for one in found) if given.fit else ():
         constants = fitted([one for one in found if one.tracker == name])
-        print(f'    "{name}": ErrorModel({", ".join(f"{value:g}" for value in astuple(constants))}),')
+        print(f'    "{name}": ErrorModel({", ".join(map(str, astuple(constants)))}),')
 
 
 if __name__ == "__main__":

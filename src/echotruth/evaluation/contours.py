@@ -71,7 +71,7 @@ class Contours:
         """
         vectors = self.position[:, 1] - self.position[:, 0]
         moved = vectors + displacement[..., 1, :] - displacement[..., 0, :]
-        at_ed, known = np.linalg.norm(vectors, axis=-1), np.isfinite(moved).all(-1)
+        at_ed, known = np.linalg.norm(vectors, axis=-1), np.asarray(np.isfinite(moved).all(-1))
         strains = np.full((len(moved), len(DEPTHS)), np.nan)
         for k in range(len(DEPTHS)):
             of_contour = self.contour == k

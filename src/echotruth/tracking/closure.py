@@ -19,7 +19,7 @@ beside the edges of the wall, which look alike in all frames."""
 GAIN_SHARE = 0.05
 """Distance over which the gain is made even, over the side of the image: else the brightest part of the wall decides,
 which may be a scar that hardly moves."""
-OPEN_DISPLACEMENT = 0.6
+OPEN_DISPLACEMENT = 0.5
 """Displacement that is left in the last frame, over the largest, above which a clip is open. In realistic and ideal
 hearts it is 0.45 at most over the whole cycle, and 0.85 at least over its first half (docs/tracking.md)."""
 DOUBTFUL_VARIANCE = 1.5

@@ -114,14 +114,14 @@ def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
-    "phase_correlation": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
-    "window_deformation": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
-    "affine_dic": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
-    "dis": ErrorModel(0.28, 4.0, 0.1, 0.26, 0.05),
-    "dis_fine": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
-    "ilk": ErrorModel(0.2, 4.0, 0.2, 0.2, 0.03),
-    "bspline_dic": ErrorModel(0.137, 4.0, 0.08, 0.23, 0.035, 0.17),
+    "phase_correlation_ED": ErrorModel(0.189, 50.0, 0.0, 0.0, 0.552),
+    "phase_correlation": ErrorModel(0.0291, 50.0, 0.341, 0.232, 0.0519),
+    "window_deformation": ErrorModel(0.202, 5.88, 0.182, 0.271, 0.0357),
+    "affine_dic": ErrorModel(0.288, 35.9, 0.227, 0.284, 0.0169),
+    "dis": ErrorModel(0.28, 3.84, 0.21, 0.235, 0.0486),
+    "dis_fine": ErrorModel(0.184, 4.42, 0.153, 0.297, 0.0479),
+    "ilk": ErrorModel(0.18, 11.2, 0.187, 0.305, 0.0536),
+    "bspline_dic": ErrorModel(0.121, 5.72, 0.206, 0.308, 0.0291, 0.17),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 
