@@ -11,7 +11,6 @@ from echotruth.tracking import trackers
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.quality import error_model
-from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker_input import TrackerInput
 
 
@@ -79,8 +78,10 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     if settings.method == "external":
         return trackers.function("external")(clip, settings)
     with explained(f"the tracker {settings.method}"):
+        from echotruth.tracking.speckle import speckle_length
+
         path = tracked_path(clip, settings)
-    speckle = speckle_length(clip.frames[0], clip.mask)
+        speckle = speckle_length(clip.frames[0], clip.mask)
     return path.displacement, error_model(settings).probability(path, speckle, clip.shape)
 
 
