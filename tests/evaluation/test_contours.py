@@ -145,6 +145,22 @@ def test_parts_of_a_contour_that_are_unknown_do_not_count_and_half_must_be_known
     np.testing.assert_allclose(found[2, 1:], -0.2)
 
 
+@pytest.mark.parametrize("count", [40, 160])
+def test_noise_of_a_line_is_no_strain_however_finely_it_is_drawn(count):
+    """Noise of 1 % of the radius at its points makes the line itself longer: by 0.2 % with 40 pieces, 4 % with 160."""
+    lines, random, tracked, drawn = ring(count), np.random.default_rng(1), [], []
+    for _ in range(20):
+        noise = 1e-5 * np.arange(1, 4)[:, None, None] * random.normal(size=(3, count, 2))
+        start = noise - 0.2 * lines.position[:, 0].reshape(3, count, 2)
+        moved = np.stack([start, np.roll(start, -1, 1)], 2).reshape(-1, 2, 2)
+        tracked.append(lines.line_strain(moved[None])[0])
+        ends = lines.position + moved
+        drawn.append(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1).sum())
+    length = np.linalg.norm(lines.position[:, 1] - lines.position[:, 0], axis=-1).sum()
+    assert np.mean(drawn) / length - 1 > -0.2 + (0.001 if count == 40 else 0.02)
+    np.testing.assert_allclose(np.mean(tracked, 0), -0.2, atol=2e-3)
+
+
 def test_a_plane_beside_the_heart_has_no_contours_and_no_strain_of_them(tube):
     heart, _ = tube
     plane = imaging_plane(heart.config.views["low"], heart.config.rf, heart.endo_at_ed)

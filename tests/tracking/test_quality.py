@@ -4,13 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import ndimage, stats
 
 from echotruth.config.tracking import METHODS, OUTSIDE, Dis, PhaseCorrelation
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.quality import ERRORS, ErrorModel, error_model, within
+from echotruth.tracking.speckle import speckle_length
 
-MODEL = ErrorModel(constant=0.3, pixel=0.2, correlation=0.5, pixel_correlation=0.1, disagreement=0.6, motion=0.05)
+MODEL = ErrorModel(speckle=0.3, limit=2.0, disagreement=0.6, wall=0.2, motion=0.05)
+SPECKLE = 1.5
 
 
 def path(variance, disagreement=np.nan, displacement=(3.0, 4.0)):
@@ -30,36 +32,68 @@ def test_points_with_the_stated_probability_are_within_the_distance_that_often()
     """A million errors in an image of 64 x 128 px, where 1/256 of the side is half a pixel."""
     random, count = np.random.default_rng(1), 1_000_000
     side = 256 / 128
-    squared = 0.3**2 + (0.2 * side) ** 2 + (0.5**2 + (0.1 * side) ** 2) * 0.4 + (0.6 * side * 0.2) ** 2
+    squared = (0.3 * SPECKLE * side) ** 2 / (1 / 0.4 + 1 / 2) + (0.6**2 + 0.2**2) * (side * 0.2) ** 2
     error = np.sqrt(squared + (0.05 * side * 5) ** 2) * random.standard_normal((2, count))
-    quality = MODEL.probability(path(0.4, 0.2), (64, 128))[1, 0]
+    quality = MODEL.probability(path(0.4, 0.2), SPECKLE, (64, 128))[1, 0]
     assert abs(np.mean(np.hypot(*error) < 1) - quality) < 4 * np.sqrt(quality * (1 - quality) / count)
 
 
 def test_quality_is_one_at_end_diastole_and_falls_with_every_sign_of_error():
-    best = MODEL.probability(path(0.1, 0.1, (1.0, 0.0)), (256, 256))
+    best = MODEL.probability(path(0.1, 0.1, (1.0, 0.0)), SPECKLE, (256, 256))
     assert best[0, 0] == 1 and 0 < best[1, 0] < 1
     for worse in (path(0.3, 0.1, (1.0, 0.0)), path(0.1, 0.5, (1.0, 0.0)), path(0.1, 0.1, (9.0, 0.0))):
-        assert MODEL.probability(worse, (256, 256))[1, 0] < best[1, 0]
+        assert MODEL.probability(worse, SPECKLE, (256, 256))[1, 0] < best[1, 0]
 
 
-def test_one_way_alone_has_no_disagreement_and_a_lost_way_has_no_certainty():
-    alone, none = MODEL.probability(path(0.1), (256, 256)), MODEL.probability(path(0.1, 0.0), (256, 256))
+def test_one_way_alone_has_no_disagreement_and_two_cannot_disagree_by_more_than_the_motion():
+    alone, none = (MODEL.probability(path(0.1, apart), SPECKLE, (256, 256)) for apart in (np.nan, 0.0))
     assert alone[1, 0] == none[1, 0]
-    assert MODEL.probability(path(np.inf), (256, 256))[1, 0] == 0
+    far, farther = (MODEL.probability(path(0.1, apart), SPECKLE, (256, 256)) for apart in (5.0, 50.0))
+    assert far[1, 0] == farther[1, 0] < none[1, 0]
+
+
+def test_point_is_less_sure_where_the_ways_of_others_differ():
+    moved, ones = np.full((2, 3, 2), 3.0), np.ones((2, 3))
+    apart = np.array([[0, 0, 0], [0.4, 0.4, np.nan]]), np.array([[0, 0, 0], [0.4, 3.0, np.nan]])
+    alike, unlike = (MODEL.probability(Path(moved, ones, 0.1 * ones, d), SPECKLE, (256, 256))[1] for d in apart)
+    assert unlike[0] < alike[0] and unlike[2] < alike[2]
+
+
+def test_where_images_are_not_alike_the_prior_limits_the_error():
+    limit = (0.3 * SPECKLE) ** 2 * 2 + (0.05 * 5) ** 2
+    lost = MODEL.probability(path(np.inf), SPECKLE, (256, 256))[1, 0]
+    assert lost == pytest.approx(within(1.0, np.array(limit)))
+    assert MODEL.probability(path(1e6), SPECKLE, (256, 256))[1, 0] == pytest.approx(lost, rel=1e-5)
+
+
+@pytest.mark.parametrize(("lateral", "axial"), [(2.5, 1.5), (2.0, 2.0)])
+def test_speckle_length_is_that_of_the_correlation(lateral, axial):
+    """A Gaussian field blurred by b correlates as exp(-x^2 / 4 b^2), so that l is sqrt(2) b."""
+    field = ndimage.gaussian_filter(np.random.default_rng(1).normal(size=(512, 512)), (axial, lateral))
+    grey = 0.8 + 0.02 * field / field.std()  # of a range so small that its amplitude is linear
+    frame = np.clip(255 * grey, 0, 255)
+    frame[0, :2] = 0, 255
+    mask = np.ones(frame.shape, bool)
+    found = speckle_length(frame.astype(np.float64), mask)
+    assert found == pytest.approx(np.sqrt(lateral**2 + axial**2), rel=0.06)
+
+
+def test_image_without_texture_has_speckle_of_a_pixel():
+    assert speckle_length(np.zeros((64, 64), np.uint8), np.ones((64, 64), bool)) == 1
+    assert speckle_length(np.zeros((64, 64), np.uint8), np.zeros((64, 64), bool)) == 1
 
 
 def test_point_that_is_not_seen_is_as_sure_as_its_displacement_is_small():
     model = replace(MODEL, unseen=0.2)
     seen, hidden = path(0.1, 0.1), replace(path(0.1, 0.1), unseen=np.array([[0.0], [1.0]]))
-    expected = -2 * np.log(1 - MODEL.probability(seen, (256, 256))[1, 0])
-    found = -2 * np.log(1 - model.probability(hidden, (256, 256))[1, 0])
+    expected = -2 * np.log(1 - MODEL.probability(seen, SPECKLE, (256, 256))[1, 0])
+    found = -2 * np.log(1 - model.probability(hidden, SPECKLE, (256, 256))[1, 0])
     assert 1 / found == pytest.approx(1 / expected + (0.2 * 5) ** 2, rel=1e-9)
-    assert model.probability(seen, (256, 256))[1, 0] == MODEL.probability(seen, (256, 256))[1, 0]
+    assert model.probability(seen, SPECKLE, (256, 256))[1, 0] == MODEL.probability(seen, SPECKLE, (256, 256))[1, 0]
 
 
 def test_lost_point_has_no_quality():
-    assert np.isnan(MODEL.probability(path(0.1, displacement=(np.nan, np.nan)), (256, 256))[1, 0])
+    assert np.isnan(MODEL.probability(path(0.1, displacement=(np.nan, np.nan)), SPECKLE, (256, 256))[1, 0])
 
 
 def test_every_method_of_ours_has_a_fitted_distribution():

@@ -30,10 +30,13 @@ def inverse_variance_weight(first: np.ndarray, second: np.ndarray) -> np.ndarray
 
 def combined_variance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Variance w^2 var1 + (1 - w)^2 var2 of the mean with the :func:`inverse_variance_weight`; arrays of one shape."""
-    weight = inverse_variance_weight(first, second)
-    total = np.zeros(np.shape(weight))
+    return mean_variance(inverse_variance_weight(first, second), first, second)
+
+
+def mean_variance(weight: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Variance w^2 var1 + (1 - w)^2 var2 of a :func:`weighted_mean`; a value of weight 0 may have an infinite one."""
+    total = np.zeros(np.broadcast(weight, first).shape)
     for factor, variance in ((weight, first), (1 - weight, second)):
-        # A value that is missing has an infinite variance and the weight 0.
         total += np.multiply(factor**2, variance, out=np.zeros_like(total), where=factor > 0)
     return total
 

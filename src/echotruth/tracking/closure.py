@@ -20,13 +20,12 @@ GAIN_SHARE = 0.05
 """Distance over which the gain is made even, over the side of the image: else the brightest part of the wall decides,
 which may be a scar that hardly moves."""
 OPEN_DISPLACEMENT = 0.5
-"""Displacement that is left in the last frame, over the largest, above which a clip is open. In the hearts of the
-benchmark's half develop it is 0.12 at most over the whole cycle, and 0.93 at least over its first half."""
-LOST_VARIANCE, DOUBTFUL_VARIANCE = 10.0, 1.5
-"""Variance of the step from the last frame to the first over the largest of consecutive frames, above which this step
-is not taken in a closed cycle, and in an open clip, where it is a long one. In those hearts it is 2 at most over the
-whole cycle; over the first half it is above 1.5 in most, and where it is below, tracking both ways has the smaller
-error."""
+"""Displacement that is left in the last frame, over the largest, above which a clip is open. In realistic and ideal
+hearts it is 0.45 at most over the whole cycle, and 0.85 at least over its first half (docs/tracking.md)."""
+DOUBTFUL_VARIANCE = 1.5
+"""Variance of the step from the last frame to the first over the largest of consecutive frames, above which an open
+clip, in which this step is a long one, is not followed backwards. Over the first half of a cycle it is above 1.5 in
+most hearts, and where it is below, tracking both ways has the smaller error."""
 LEAST_MOTION = 0.5
 """RMS displacement below which nothing moves that could come back, px of the block means."""
 
@@ -51,25 +50,21 @@ class Closure:
 
     @property
     def is_open(self) -> bool:
-        """Whether the clip is no closed cycle; not if that cannot be told, as it should be one."""
-        return self.displacement > OPEN_DISPLACEMENT or not self._is_below(LOST_VARIANCE)
+        """Whether the clip is no closed cycle; not if that cannot be told, as it should be one.
+
+        That speckle has changed does not make it open: the wall may have come back all the same.
+        """
+        return self.displacement > OPEN_DISPLACEMENT
 
     @property
     def is_followed(self) -> bool:
         """Whether the tissue of the last frame can be followed to the first, so that a clip can be tracked backwards.
 
-        In an open clip this is a long step, which only images that are as alike as consecutive ones allow.
-        """
-        return self._is_below(DOUBTFUL_VARIANCE if self.is_open else LOST_VARIANCE)
-
-    def _is_below(self, largest_ratio: float) -> bool:
-        """Whether the last step has less than this multiple of the variance of any other, or neither is known.
-
-        Correlations are compared by the variance of a shift that is found with them, see
-        :func:`echotruth.tracking.accumulation.step_variance`.
+        In an open clip this is a long step, which only images that are as alike as consecutive ones allow: by the
+        variance of a shift that is found with them, see :func:`echotruth.tracking.accumulation.step_variance`.
         """
         last, largest = step_variance(np.array([self.closing, self.consecutive]))
-        return not last > largest_ratio * largest
+        return not self.is_open or not last > DOUBTFUL_VARIANCE * largest
 
     def __str__(self) -> str:
         alike = f"its last frame correlates with the first by {self.closing:.2f}, consecutive ones by"
@@ -81,7 +76,9 @@ class Closure:
 def closure(frames: np.ndarray, mask: np.ndarray) -> Closure:
     """Compare the last frame of a clip with its first.
 
-    Dense flows from each frame to the next, and from the first to the last, tell the motion between them.
+    Dense flows from each frame to the next, and from the first to the last, tell the motion between them. What is left
+    in the last frame is the mean of what the last flow and the sum of the others say: the one errs towards no motion
+    where speckle is new, the other drifts.
 
     Parameters
     ----------
@@ -105,13 +102,13 @@ def closure(frames: np.ndarray, mask: np.ndarray) -> Closure:
     amplitudes = [even_gain(amplitude, GAIN_SHARE * max(size), typical) for amplitude in amplitudes]
     images = list(np.array(amplitudes) / (np.max(amplitudes) or 1))
     flows = [optical_flow(first, second) for first, second in pairwise(images)]
-    closing = optical_flow(images[0], images[-1])
+    last = optical_flow(images[0], images[-1])
     correlations = [_correlation(*pair, flow, inside) for pair, flow in zip(pairwise(images), flows, strict=True)]
     # A frame without texture, as a black one, tells nothing.
     known = [correlation for correlation in correlations if np.isfinite(correlation)]
     return Closure(
-        _remaining(flows, closing, inside),
-        _correlation(images[0], images[-1], closing, inside),
+        _remaining(flows, last, inside),
+        _correlation(images[0], images[-1], last, inside),
         float(min(known, default=np.nan)),
     )
 
@@ -121,14 +118,18 @@ def _reduced(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
 
 
-def _remaining(flows: list[np.ndarray], closing: np.ndarray, inside: np.ndarray) -> float:
-    """RMS flow from the first frame to the last, over the largest RMS distance of points that the others carry."""
+def _remaining(flows: list[np.ndarray], last: np.ndarray, inside: np.ndarray) -> float:
+    """RMS displacement from the first frame to the last, by the flow between them and by all others, over the largest.
+
+    The largest is that of any frame, of points that the flows from frame to frame carry.
+    """
     points = _points(inside)
     position, farthest = points, 0.0
     for flow in flows:
         position = position + interpolate_field(flow, _within(position, inside.shape))
         farthest = max(farthest, _length(position - points))
-    return _length(closing[inside]) / farthest if len(flows) > 1 and farthest > LEAST_MOTION else np.nan
+    left = (_length(last[inside]) + _length(position - points)) / 2
+    return left / farthest if len(flows) > 1 and farthest > LEAST_MOTION else np.nan
 
 
 def _correlation(first: np.ndarray, second: np.ndarray, flow: np.ndarray, inside: np.ndarray) -> float:

@@ -2,9 +2,9 @@
 
 Near means within 1/256 of the side of the image, the distance of 1 px of TAP-Vid (Doersch et al. 2022,
 arXiv:2211.03726). The error of a point is taken to be Gaussian in the plane. Its standard deviation follows from what a
-tracker can tell of itself: the correlation of the images along the path of the point, how far the paths forwards and
-backwards are apart, and how far the point has moved. The constants of each method are fitted by maximum likelihood
-(benchmarks/calibration.py of 02d7c8a); docs/tracking.md says on which hearts.
+tracker can tell of itself: the correlation of the images along the path of the point and the size of their speckle, how
+far the paths forwards and backwards are apart, and how far the point has moved. The constants of each method are fitted
+by maximum likelihood (benchmarks/quality.py); docs/tracking.md says on which hearts.
 """
 
 from dataclasses import dataclass
@@ -22,34 +22,39 @@ IMAGE_FRACTION = 1 / 256
 class ErrorModel:
     """Distribution of the error of a tracker; lengths are in units of 1/256 of the longer side of the image.
 
-    The variance s^2 of each coordinate of the error, with the side h of a pixel, the variance V of
-    :class:`echotruth.tracking.accumulation.Path`, the disagreement d and the tracked displacement u, is
+    The variance s^2 of each coordinate of the error, with the correlation length l of the speckle
+    (:mod:`echotruth.tracking.speckle`), the variance V of :class:`echotruth.tracking.accumulation.Path`, the tracked
+    displacement u and the disagreement d, which is u at most, is
 
-        s^2 = constant^2 + (pixel h)^2 + (correlation^2 + (pixel_correlation h)^2) V + (disagreement d)^2 + (motion u)^2
-            + (unseen q u)^2,
+        s^2 = (speckle l)^2 V / (1 + V / limit) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2,
 
-    where q, from 0 to 1, is how far the point is not seen in the image.
+    where D is the RMS of d over the points in the frame, and q, from 0 to 1, how far the point is not seen in the
+    image. V l^2 is the variance of the places of speckle. It counts in full where images are alike. Where they are not,
+    the tracker relies on what it expects of the motion, as a smooth one: with that as prior the variance is the noise's
+    times the prior's over their sum. The two ways err together at many a point, but not at all of them, so that D tells
+    more than d. Two ways that are farther apart than the point has moved do not say that it is farther off.
 
     Attributes
     ----------
-    constant, pixel, correlation, pixel_correlation, disagreement, motion, unseen : float
+    speckle, limit, disagreement, wall, motion, unseen : float
         See above.
     """
 
-    constant: float
-    pixel: float
-    correlation: float
-    pixel_correlation: float
+    speckle: float
+    limit: float
     disagreement: float
+    wall: float
     motion: float
     unseen: float = 0.0
 
-    def probability(self, path: Path, shape: tuple[int, ...]) -> np.ndarray:
+    def probability(self, path: Path, speckle: float, shape: tuple[int, ...]) -> np.ndarray:
         """Probability that points are within 1/256 of the side of the image of their true places.
 
         Parameters
         ----------
         path : Path
+        speckle : float
+            Correlation length of the speckle, px.
         shape : tuple of int
             Axial and lateral size of the image, px.
 
@@ -58,50 +63,65 @@ class ErrorModel:
         ndarray of shape (frame, n)
             From 0 to 1; 1 at frame 0, NaN where the point is lost.
         """
-        side = 1 / (IMAGE_FRACTION * max(shape))  # of a pixel
-        displacement = np.hypot(*np.moveaxis(path.displacement, -1, 0))
-        expected = self.variance(side, path.variance, side * path.disagreement, side * displacement)
-        if path.unseen is not None:
-            expected += (self.unseen * path.unseen * side * displacement) ** 2
-        probability = within(1.0, expected)
+        terms = squares(path, speckle, shape)
+        probability = within(1.0, self.variance(terms))
         probability[0] = 1.0
         probability[~np.isfinite(path.displacement).all(-1)] = np.nan
         return probability
 
-    def variance(
-        self, pixel: float | np.ndarray, variance: np.ndarray, disagreement: np.ndarray, displacement: np.ndarray
-    ) -> np.ndarray:
-        """s^2 of points; all lengths in units of 1/256 of the longer side of the image.
+    def variance(self, terms: "Squares") -> np.ndarray:
+        """s^2 of points, in squares of 1/256 of the longer side of the image; the shape is that of the terms."""
+        v = terms.variance
+        noise = np.divide(v, 1 + v / self.limit, out=np.full_like(v, self.limit), where=np.isfinite(v))
+        expected = self.speckle**2 * terms.speckle * noise
+        expected += self.disagreement**2 * terms.disagreement + self.wall**2 * terms.wall
+        return expected + (self.motion**2 + self.unseen**2 * terms.unseen) * terms.motion
 
-        Parameters
-        ----------
-        pixel : float or ndarray
-            Side h of a pixel.
-        variance, disagreement, displacement : ndarray of one shape
-            V, d and u; where d is NaN, there is only one way, and it is left out.
 
-        Returns
-        -------
-        ndarray of the same shape
-        """
-        rate = self.correlation**2 + (self.pixel_correlation * pixel) ** 2
-        known = np.nan_to_num(disagreement, nan=0.0)
-        terms = (self.constant, self.pixel * pixel, self.disagreement * known, self.motion * displacement)
-        expected = np.multiply(rate, variance, out=np.zeros(np.shape(variance)), where=np.greater(rate, 0))
-        for term in terms:
-            expected += np.square(term)
-        return expected
+@dataclass(frozen=True)
+class Squares:
+    """What the variance of the error is made of, in squares of 1/256 of the longer side of the image.
+
+    Attributes
+    ----------
+    variance : ndarray of shape (frame, n)
+        V, a number.
+    speckle : float
+        l^2.
+    disagreement, wall, motion : ndarray of shape (frame, n)
+        d^2, 0 where there is one way only, D^2, which is the same for all points of a frame, and u^2.
+    unseen : ndarray of shape (frame, n)
+        q^2, a number.
+    """
+
+    variance: np.ndarray
+    speckle: float | np.ndarray
+    disagreement: np.ndarray
+    wall: np.ndarray
+    motion: np.ndarray
+    unseen: np.ndarray
+
+
+def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
+    """Terms of :class:`ErrorModel` for a path, with the arguments of :meth:`ErrorModel.probability`."""
+    side = 1 / (IMAGE_FRACTION * max(shape))  # of a pixel
+    moved = side * np.hypot(*np.moveaxis(path.displacement, -1, 0))
+    apart = np.minimum(side * np.nan_to_num(path.disagreement, nan=0.0), np.nan_to_num(moved)) ** 2
+    known = np.isfinite(moved).sum(1, keepdims=True)
+    wall = np.broadcast_to(apart.sum(1, keepdims=True) / np.maximum(known, 1), apart.shape)
+    unseen = np.zeros_like(moved) if path.unseen is None else path.unseen
+    return Squares(path.variance, (speckle * side) ** 2, apart, wall, moved**2, unseen**2)
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.0, 0.0, 0.226, 0.145, 0.0, 0.0),
-    "phase_correlation": ErrorModel(0.0, 0.307, 0.0, 0.0812, 0.0737, 0.096),
-    "window_deformation": ErrorModel(0.286, 0.257, 0.339, 0.352, 0.0853, 0.0595),
-    "affine_dic": ErrorModel(0.31, 0.192, 0.355, 0.655, 0.253, 0.0338),
-    "dis": ErrorModel(0.28, 0.386, 0.309, 0.205, 0.15, 0.0712),
-    "dis_fine": ErrorModel(0.292, 0.255, 0.294, 0.0, 0.196, 0.0516),
-    "ilk": ErrorModel(0.475, 0.0, 0.11, 0.173, 0.0, 0.0771),
-    "bspline_dic": ErrorModel(0.358, 0.0652, 0.0459, 0.0429, 0.25, 0.0221, 0.104),
+    "phase_correlation_ED": ErrorModel(0.189, 50.0, 0.0, 0.0, 0.552),
+    "phase_correlation": ErrorModel(0.0291, 50.0, 0.341, 0.232, 0.0519),
+    "window_deformation": ErrorModel(0.202, 5.88, 0.182, 0.271, 0.0357),
+    "affine_dic": ErrorModel(0.288, 35.9, 0.227, 0.284, 0.0169),
+    "dis": ErrorModel(0.28, 3.84, 0.21, 0.235, 0.0486),
+    "dis_fine": ErrorModel(0.184, 4.42, 0.153, 0.297, 0.0479),
+    "ilk": ErrorModel(0.18, 11.2, 0.187, 0.305, 0.0536),
+    "bspline_dic": ErrorModel(0.121, 5.72, 0.206, 0.308, 0.0291, 0.17),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 

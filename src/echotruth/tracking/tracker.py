@@ -79,8 +79,11 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     if isinstance(settings, OUTSIDE):
         return trackers.function(settings.method)(clip, settings)
     with explained(f"the tracker {settings.method}"):
+        from echotruth.tracking.speckle import speckle_length
+
         path = tracked_path(clip, settings)
-    return path.displacement, error_model(settings).probability(path, clip.shape)
+        speckle = speckle_length(clip.frames[0], clip.mask)
+    return path.displacement, error_model(settings).probability(path, speckle, clip.shape)
 
 
 def tracked_path(clip: TrackerInput, settings: Any) -> Path:

@@ -43,7 +43,7 @@ import numpy as np
 from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
 from echotruth.tracking import bidirectional
-from echotruth.tracking.accumulation import Path
+from echotruth.tracking.accumulation import Path, step_variance
 from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import decompress, even_gain, grey_levels, rms
@@ -89,6 +89,8 @@ class WallTrajectory:
         Variance of the displacement, px^2 up to a factor; infinite in frames without texture.
     ncc : ndarray of shape (frame, n)
         Correlation of image and template around each point; NaN where one of them has no texture.
+    decorrelation : ndarray of shape (frame, n)
+        Sum of :func:`.accumulation.step_variance` of the correlations around each point, over the templates on the way.
     likeness : list of (ndarray of shape (k, 2), ndarray of shape (k,))
         Of every frame but the first: displaced pixels, px, and the correlation of image and template around each;
         empty where it is known already what is seen.
@@ -97,6 +99,7 @@ class WallTrajectory:
     coefficients: np.ndarray
     variance: np.ndarray
     ncc: np.ndarray
+    decorrelation: np.ndarray
     likeness: list[tuple[np.ndarray, np.ndarray]]
 
 
@@ -225,6 +228,7 @@ class WallTracker:
         template = latest = self._template(0, coefficients[0], warped)
         amplitude = {0: self._amplitude(0, coefficients[0])}
         ncc = [self.ncc.at_points(amplitude[0], amplitude[0])] * len(order)
+        decorrelation = [np.zeros_like(ncc[0])] * len(order)
         likeness = []
         for before, now in pairwise(order):
             start = self._predict(now, before, coefficients[before], template)
@@ -237,12 +241,13 @@ class WallTracker:
             variance[now] = variance[template.frame] + self._variance(template, warped)
             amplitude[now] = self._amplitude(now, fitted)
             ncc[now] = self.ncc.at_points(amplitude[template.frame], amplitude[now])
+            decorrelation[now] = decorrelation[template.frame] + step_variance(ncc[now])
             if self.visible is None:
                 alike = self.pixels.at_points(template.warped[:, 0], warped[:, 0])
                 likeness.append((self.region.displaced(fitted)[::LIKENESS_STRIDE], alike))
             if np.isfinite(variance[now]):
                 latest = self._template(now, fitted, warped)
-        return WallTrajectory(coefficients, variance, np.array(ncc), likeness)
+        return WallTrajectory(coefficients, variance, np.array(ncc), np.array(decorrelation), likeness)
 
     def _template(self, frame: int, coefficients: np.ndarray, warped: np.ndarray) -> Template:
         seen = self._seen(coefficients)
@@ -314,7 +319,7 @@ def combine(region: WallRegion, points: np.ndarray, forward: WallTrajectory, bac
     Returns
     -------
     Path
-        Its variance is in px^2, up to a factor, and the same for all points.
+        The weights are those of whole frames; the variance is that of the correlation around each point.
     """
     weight = bidirectional.inverse_variance_weight(forward.variance, backward.variance)[:, None]
     ways = [_displacement(region, points, trajectory) for trajectory in (forward, backward)]
@@ -323,11 +328,11 @@ def combine(region: WallRegion, points: np.ndarray, forward: WallTrajectory, bac
     correlation[0] += 1 - correlation[0]
     displacement[np.isnan(correlation)] = np.nan
     if forward is backward:
-        variance, disagreement = forward.variance, np.full_like(correlation, np.nan)
+        variance, disagreement = forward.decorrelation, np.full_like(correlation, np.nan)
     else:
-        variance = bidirectional.combined_variance(forward.variance, backward.variance)
+        variance = bidirectional.mean_variance(weight, forward.decorrelation, backward.decorrelation)
         disagreement = np.hypot(*np.moveaxis(ways[0] - ways[1], -1, 0))
-    return Path(displacement, correlation, np.broadcast_to(variance[:, None], correlation.shape), disagreement)
+    return Path(displacement, correlation, variance, disagreement)
 
 
 def _displacement(region: WallRegion, points: np.ndarray, trajectory: WallTrajectory) -> np.ndarray:
