@@ -133,7 +133,7 @@ MOTIONS: list[Keys] = [
     {"drift.lateral_mm": (-0.25, 0.25), "drift.axial_mm": (-0.2, 0.2), "drift.elevation_mm": (-0.15, 0.15)},
     {"breathing.axial_mm": (0.3, 0.6), "breathing.elevation_mm": (0, 0.3), "breathing.phase_deg": (0, 360)},
 ]
-SHADOW = {
+SHADOW: dict[str, Keys] = {
     "mouse": {"side": ["left", "right"], "edge_deg": (12, 22), "edge_width_mm": 0.8, "level_dB": (-30, -10)},
     "human": {"edge_deg": (10, 16), "level_dB": (-20, -10)},
 }
