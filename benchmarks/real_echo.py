@@ -57,8 +57,7 @@ def tracked(frames: NDArray[np.uint8], wall: et.Wall, tracker: str, scale: int =
     """The wall followed there and back."""
     small = [cv2.resize(frame, None, fx=1 / scale, fy=1 / scale, interpolation=cv2.INTER_AREA) for frame in frames]
     clip = et.read_clip(np.stack(small)[ORDER], spacing_mm=scale * PIXEL_MM, frame_time_ms=FRAME_MS)
-    method, options = TRACKERS[tracker]
-    return et.speckle_tracking(clip, wall, method, reference="previous", **options)
+    return et.speckle_tracking(clip, wall, TRACKERS[tracker][0], reference="previous", **TRACKERS[tracker][1])
 
 
 def length(vectors: NDArray[np.float64]) -> float:
