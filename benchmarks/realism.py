@@ -219,16 +219,21 @@ def real_clip(file: Path) -> NDArray[np.uint8]:
 def real_pictures(file: Path) -> Iterator[Picture]:
     """A cycle of the real clip. Frames that are there twice are followed by the first that differs."""
     frames = real_clip(file)
-    tip, middle, half, first, last = SECTOR
-    rows, columns = np.indices(frames.shape[1:])
-    reach, angle = np.hypot(rows - tip, columns - middle), np.degrees(np.arctan2(columns - middle, rows - tip))
-    scan = (np.abs(angle) < half) & (reach > first) & (reach < last)
+    shape, tip = frames.shape[1:], SECTOR[:2]
     for k in range(*CYCLE):
         following = next(frame for frame in frames[k + 1 :] if (frame != frames[k]).any())
-        yield Picture(frames[k], following, drawn_wall(k, frames.shape[1:]), scan, (tip, middle), PIXEL_MM)
+        yield Picture(frames[k], following, drawn_wall(k).mask(shape), real_scan(shape), tip, PIXEL_MM)
 
 
-def drawn_wall(frame: int, shape: tuple[int, ...]) -> Masks:
+def real_scan(shape: tuple[int, ...]) -> Masks:
+    """Pixels of the real clip within its sector, without the writing beside it."""
+    tip, middle, half, first, last = SECTOR
+    rows, columns = np.indices(shape)
+    reach, angle = np.hypot(rows - tip, columns - middle), np.degrees(np.arctan2(columns - middle, rows - tip))
+    return (np.abs(angle) < half) & (reach > first) & (reach < last)
+
+
+def drawn_wall(frame: int) -> et.Wall:
     """The wall of the real clip in a frame of the cycle: linear in time between those drawn, point by point."""
     points = pd.read_csv(HERE / "apical_wall.csv", comment="#")
     drawn = sorted(points["frame"].unique())
@@ -242,7 +247,7 @@ def drawn_wall(frame: int, shape: tuple[int, ...]) -> Masks:
             for k in (after - 1, after)
         )
         borders.append((1 - share) * before + share * then + ORIGIN[::-1])
-    return et.Wall(*borders, VIEW).mask((shape[0], shape[1]))
+    return et.Wall(*borders, VIEW)
 
 
 def _resampled(points: pd.DataFrame, number: int = 100) -> NDArray[np.float64]:
