@@ -188,7 +188,7 @@ class Leaflets(CavityBody):
         return cls(scene, part, place, amplitudes)
 
     def in_heart(self, frame: int) -> Floats:
-        rim, place = self._valve.rim(frame), np.empty_like(self.place)
+        rim, place = self._valve.rim(frame), np.zeros_like(self.place)
         for side in LEAFLETS:
             of_it = self.part == side
             place[of_it] = self._valve.leaflet(frame, side, *self.place[of_it, :2].T)
