@@ -22,6 +22,7 @@ from scipy import ndimage
 from scipy.optimize import minimize
 
 from echotruth.cases import Case
+from echotruth.config.tracking import OUTSIDE
 from echotruth.evaluation.clip import read_clips
 from echotruth.evaluation.scoring import read_truth
 from echotruth.repository.reader import Repository
@@ -79,7 +80,7 @@ def samples_of_view(repository: Repository, case: Case, view: str) -> Iterator[S
     """Samples of the clips of one view of a case, in three conditions."""
     true, plane = read_truth(repository, case.id, view).displacement, case.config.views[view].plane
     condition = str(case.labels.get("condition", "plain"))
-    trackers = [tracker for tracker in case.config.tracking.trackers.values() if tracker.method != "external"]
+    trackers = [tracker for tracker in case.config.tracking.trackers.values() if not isinstance(tracker, OUTSIDE)]
     for size, clip in read_clips(repository, case.id, view).items():
         displacement, speckle = true / clip.spacing, speckle_length(clip.frames[0], clip.mask)
         noisy, inside = shadowed(clip.frames, CENTRE_DEG[plane])

@@ -96,6 +96,13 @@ def count(text: str) -> int:
     return int(text)
 
 
+def model(text: str) -> str:
+    """Path of a model in ONNX, as an option gives it."""
+    if not text.endswith(".onnx"):
+        raise argparse.ArgumentTypeError(f"{text} must end with .onnx")
+    return text
+
+
 def fail(message: str) -> int:
     """Print why a command cannot be done, a line for each reason; return its exit status."""
     print(named(message), file=sys.stderr)

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from echotruth.cli.command import add_repeated, fail
+from echotruth.cli.command import add_repeated, fail, model
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -12,7 +12,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     tracker = parser.add_mutually_exclusive_group(required=True)
     tracker.add_argument("--tracker", help="package.module:function, an entry point, or a method such as dis")
     text = "a point tracker in ONNX, such as model.onnx (what it takes: model.yaml)"
-    tracker.add_argument("--onnx", dest="tracker", metavar="MODEL", help=text)
+    tracker.add_argument("--onnx", dest="tracker", type=model, metavar="MODEL", help=text)
     # `arguments.command` is the name of the subcommand.
     tracker.add_argument("--command", dest="program", help='a program, such as "track {input} {output}"')
     parser.add_argument("--timeout", type=float, help="longest time of the program per clip, s (default: 3600)")

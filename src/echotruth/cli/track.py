@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.cli import recording
-from echotruth.cli.command import did_you_mean, fail, named
+from echotruth.cli.command import did_you_mean, fail, model, named
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall_file import default_output, said
 
@@ -33,7 +33,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     tracker = parser.add_mutually_exclusive_group()
     tracker.add_argument("--tracker", default="bspline_dic", help=text)
     text = "in place of a tracker: a point tracker in ONNX, such as model.onnx (what it takes: model.yaml)"
-    tracker.add_argument("--onnx", dest="tracker", metavar="MODEL", help=text)
+    tracker.add_argument("--onnx", dest="tracker", type=model, metavar="MODEL", help=text)
     parser.add_argument("-o", "--output", type=Path, default=Path("strain"), help="folder (default: strain)")
 
 

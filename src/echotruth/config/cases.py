@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 Pair = Annotated[list[FiniteFloat], Field(min_length=2, max_length=2)]
 
-MAX_KEYS = 256
+MAX_KEYS = 1024
 """Drawn keys at most, as columns of a table."""
 KINDS = ("uniform", "log_uniform", "normal", "integers", "choice")
 """Keys of a distribution of which one is given."""
@@ -140,6 +140,11 @@ def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
+def _preset_list(value: Any) -> Any:
+    """A list of a name, empty for `none`, which stored configurations of version 0.1 have."""
+    return [] if value == "none" else _as_list(value)
+
+
 def presets_of(draw: dict[str, Any]) -> list[str]:
     """Names of the presets that the section `cases.draw` asks for, as far as they are known."""
     given = _as_list(draw.get("preset"))
@@ -149,7 +154,7 @@ def presets_of(draw: dict[str, Any]) -> list[str]:
 class Draw(Section):
     """Hearts drawn at random: each has one value of every key in `keys`."""
 
-    preset: Annotated[list[Literal["acoustics", "hearts"]], BeforeValidator(_as_list)] = Field(default=[])
+    preset: Annotated[list[Literal["acoustics", "hearts"]], BeforeValidator(_preset_list)] = Field(default=[])
     """Keys that are drawn beside those in `keys`: one or both. `hearts`: size, shape, fibres, muscle, load and disease,
     over ranges in which hearts of all species are usable (docs/cases.md); use it with `loop.kind: circulation`.
     `acoustics`: levels of tissues, noise and artefacts, attenuation, gain and grey map, and the pose of each view

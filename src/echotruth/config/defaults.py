@@ -2,6 +2,7 @@
 scan from the array, lengths of trackers from the field of view.
 """
 
+from math import isfinite
 from typing import Any, NamedTuple
 
 from echotruth.config.cases import POSES, poses, presets_of
@@ -257,12 +258,16 @@ def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
     if isinstance(views, dict) and isinstance(preset := views.get("preset"), str):
         views = VIEWS.get(preset, {}) | {name: view for name, view in views.items() if name != "preset"}
     valid = isinstance(draw, dict) and isinstance(draw.get("keys", {}), dict) and isinstance(views, dict)
-    if not valid or "acoustics" not in presets_of(draw) or not isinstance(focus, int | float):
+    if not valid or "acoustics" not in presets_of(draw) or not _is_finite(focus):
         return values
     known = {name: {key: _value({"view": view}, f"view.{key}") for key in POSES} for name, view in views.items()}
-    known = {name: {key: v for key, v in keys.items() if isinstance(v, int | float)} for name, keys in known.items()}
+    known = {name: {key: v for key, v in keys.items() if _is_finite(v)} for name, keys in known.items()}
     keys = poses(known, focus) | draw.get("keys", {})
     return values | {"cases": values["cases"] | {"draw": draw | {"keys": keys}}}
+
+
+def _is_finite(value: Any) -> bool:
+    return isinstance(value, int | float) and isfinite(value)
 
 
 def _lengths(tracker: dict[str, Any], scale: float) -> dict[str, Any]:

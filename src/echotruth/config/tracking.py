@@ -247,6 +247,10 @@ class OnnxSignature(Section):
     frames_per_call: Annotated[int, Field(ge=2)] | None = None
     points_per_call: Annotated[int, Field(ge=1)] | None = None
 
+    @check
+    def _two_values(self) -> None:
+        self.require(self.values is None or self.values[0] != self.values[1], "values", "must be black and then white")
+
 
 class Onnx(Section):
     """A learned point tracker in ONNX, which ONNX Runtime runs on one core."""

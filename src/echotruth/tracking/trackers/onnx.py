@@ -52,7 +52,7 @@ def _followed(model: "Model", video: Floats, points: Floats) -> tuple[Floats, Fl
         tracks, visibility = model(video[frames], points + moved[first])
         # Less the model's own places in the first frame, lest half a pixel between conventions remain.
         moved[first : first + size] = moved[first] + (tracks - tracks[0])[:count]
-        seen[first : first + size] = visibility[:count]
+        seen[first : first + size] = np.minimum(seen[first], visibility[:count])
     return moved, seen
 
 
