@@ -12,8 +12,9 @@ unexport PYTHONDONTWRITEBYTECODE
 demo: .venv/ready
 	$(BIN)/echotruth run config/demo.yaml
 
-benchmark: .venv/ready  ## the suite of the benchmark's page; takes hours, and goes on where it was stopped
+benchmark: .venv/ready  ## the suite and docs/benchmark.md; takes hours, and goes on where it was stopped
 	for part in 1 2 3 4 5 6 7 8 9 10; do $(BIN)/python -m benchmarks.suite part $$part --jobs 2 || exit; done
+	$(BIN)/python -m benchmarks.suite page
 
 # Two workers, and the static checks beside them; the tests of a module stay on one worker, because they share expensive
 # fixtures.

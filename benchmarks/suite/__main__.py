@@ -11,12 +11,13 @@ The exit status is 0 if it is done, and 2 if it cannot be done.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from functools import partial
 from pathlib import Path
 
-from . import page
-from .parts import SMALL, make_part, read_parts
+from echotruth.extras import MissingPackage, explained
+from echotruth.workflow import instructions
 
 PROGRAM = "python -m benchmarks.suite"
 
@@ -28,7 +29,7 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = whole.add_subparsers(dest="command", required=True)
     part = commands.add_parser("part", help="make eight hearts and score")
-    part.add_argument("part", type=number, help="its number, or small")
+    part.add_argument("part", help="its number, or small")
     part.add_argument("--jobs", type=int, default=1, help="processes (default: 1); scores do not depend on it")
     part.add_argument("--tracker", type=Path, help="YAML file of further trackers, whose scores go beside the part")
     table = commands.add_parser("page", help="write the page, from the parts alone")
@@ -37,24 +38,31 @@ def parser() -> argparse.ArgumentParser:
     return whole
 
 
-def number(part: str) -> int:
-    """Number of a part that is given by its number or as `small`."""
-    return SMALL if part == "small" else int(part)
-
-
 def main() -> int:
     """Do what the command line asks for; the exit status."""
     given = parser().parse_args()
     try:
-        if given.command == "page":
-            print(page.write(read_parts(), given.page, given.split))
-        else:
-            print(make_part(given.part, given.jobs, given.tracker, partial(print, flush=True)))
-    except (ValueError, OSError) as error:
+        with explained(PROGRAM):
+            from . import page, parts
+
+            if given.command == "page":
+                print(page.write(parts.read_parts(), given.page, given.split))
+            else:
+                part, say = parts.number(given.part), partial(print, flush=True)
+                print(parts.make_part(part, given.jobs, given.tracker, say))
+    except (ValueError, OSError, MissingPackage) as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     return 0
 
 
+def set_instructions() -> None:
+    """Start this program anew with the instructions of a run; NumPy, which tells what to set, is loaded by then."""
+    wanted = os.environ | instructions.environment()
+    if wanted != dict(os.environ):
+        os.execve(sys.executable, sys.orig_argv, wanted)
+
+
 if __name__ == "__main__":
+    set_instructions()
     sys.exit(main())

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cache
+from hashlib import sha256
 from math import ceil
+from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
 
@@ -23,7 +25,7 @@ from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.repository.datasets import as_stored
-from echotruth.repository.version import settings_hash, version_of
+from echotruth.repository.version import PACKAGE, settings_hash, version_of
 from echotruth.section import value_of
 
 SEED, HEARTS_OF_PART, ATTEMPTS = 2, 8, 20
@@ -65,6 +67,12 @@ TRACKERS: dict[str, dict[str, Any]] = {
 }
 WINDOW_MM = 1.5
 """Window of `corrected` in a mouse."""
+
+FILES = (
+    *(Path(__file__).parent / f"{name}.py" for name in ("hearts", "scores", "columns")),
+    PACKAGE / "config/diagnosis.py",
+)
+"""Files on which the numbers depend, beside those that the version of a view counts."""
 
 Keys = dict[str, Any]
 """Dotted key -> value, or a range (tuple) or choices (list) from which it is drawn."""
@@ -190,8 +198,10 @@ def _condition(species: str, condition: str, random: Random) -> Keys:
 
 
 def _configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None) -> et.Config:
-    corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
-    settings = SETTINGS | {"tracking": {"grid_px": 4, "trackers": trackers or TRACKERS | {"corrected": corrected}}}
+    if trackers is None:
+        corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
+        trackers = TRACKERS | {"corrected": corrected}
+    settings = SETTINGS | {"tracking": {"grid_px": 4, "trackers": trackers}}
     return et.configure(merged(settings, nested({"geometry.preset": species} | keys), whole=()))
 
 
@@ -248,7 +258,8 @@ def _planned(split: str, species: str) -> Iterable[dict[str, Any]]:
 def suite_version() -> str:
     """Hash of the code that decides the numbers, and of the configurations of all hearts at their first attempt."""
     configs = [one.case.config for row in plan() for one in cases_of(row, 1)]
-    return settings_hash(*(version_of("tracking", config, view) for config in configs for view in config.views))
+    versions = (version_of("tracking", config, view) for config in configs for view in config.views)
+    return settings_hash(*(sha256(file.read_bytes()).hexdigest() for file in FILES), *versions)
 
 
 def motion_keys(row: Mapping[str, Any], attempt: int) -> Keys:

@@ -1,7 +1,8 @@
 """Parts of the suite: eight hearts each, whose scores are kept in benchmarks/results/suite2/part-KK.csv.gz.
 
 What a tracker costs differs from run to run; it is in a file of its own, cost-KK.csv, so that the scores of a part are
-the same bytes wherever it is made.
+the same bytes wherever it is made with the same instructions of the processor, packages and C library
+(docs/determinism.md).
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import yaml
 
 from echotruth import files
+from echotruth.config.loading import read_yaml
+from echotruth.evaluation.leaderboard import RANKED_BY
 from echotruth.evaluation.parallel import in_processes
 
-from .columns import IDENTITY, TEXT
+from .columns import ABOUT, HASHES, IDENTITY, TEXT
 from .hearts import plan, suite_version
 from .scores import Row, heart_rows
 
@@ -35,13 +37,21 @@ CLIP = ("case", "view", "size_px")
 DIGITS = "%.5g"
 
 
+def number(part: str) -> int:
+    """Number of a part that is given by its number or as `small`; ValueError if there is none."""
+    numbers = {"small": SMALL} | {str(row["part"]): int(row["part"]) for row in plan()}
+    if part not in numbers:
+        raise ValueError(f"part {part}: is not there: use one of 1 to {plan()[-1]['part']}, or small")
+    return numbers[part]
+
+
 def make_part(part: int, jobs: int = 1, trackers: Path | None = None, say: Callable[[str], None] = print) -> Path:
     """Make the hearts of a part, score the trackers on them, and write the scores.
 
     Parameters
     ----------
     part : int
-        From 1; `SMALL` is the small one.
+        As :func:`number` returns it.
     jobs : int
         Number of processes.
     trackers : Path, optional
@@ -58,13 +68,13 @@ def make_part(part: int, jobs: int = 1, trackers: Path | None = None, say: Calla
     Raises
     ------
     ValueError
-        If there is no such part, or the images of further trackers are not those of the part.
+        If the file names no tracker, or one that was scored already, or the images of further trackers are not those of
+        the part.
     """
     hearts = [row for row in plan() if row["part"] == (part or 1)][: None if part else SMALL_HEARTS]
-    if not hearts:
-        raise ValueError(f"part {part}: is not there: use one of 1 to {plan()[-1]['part']}, or small")
-    given = None if trackers is None else yaml.safe_load(trackers.read_text(encoding="utf-8"))
-    folder = FOLDER if part else SCRATCH
+    folder, suffix = FOLDER if part else SCRATCH, "" if trackers is None else f"-{trackers.stem}"
+    path = folder / f"part-{part:02d}{suffix}.csv.gz"
+    given = None if trackers is None else _further(trackers, path)
     before = None if given is None else _read(folder / f"part-{part:02d}.csv.gz")
     rows: list[Row] = []
     for heart, found in zip(hearts, in_processes(partial(_kept, given), hearts, jobs), strict=True):
@@ -73,10 +83,8 @@ def make_part(part: int, jobs: int = 1, trackers: Path | None = None, say: Calla
     table = pd.DataFrame(rows).assign(part=part)
     if before is not None:
         _check_images(table, before)
-    suffix = "" if trackers is None else f"-{trackers.stem}"
     cost = table.groupby(["species", "view", "size_px", "tracker"])["cpu_s"].agg(["count", "mean"]).reset_index()
     files.write(folder / f"cost-{part:02d}{suffix}.csv", cost.to_csv(index=False, float_format="%.3g").encode())
-    path = folder / f"part-{part:02d}{suffix}.csv.gz"
     files.write(path, packed(table.drop(columns="cpu_s")))
     return path
 
@@ -95,20 +103,27 @@ def packed(table: pd.DataFrame) -> bytes:
 def read_parts(folder: Path = FOLDER) -> pd.DataFrame:
     """All parts, and those of further trackers, as one table with the columns of :mod:`.columns`.
 
+    It has no rows if there is no part.
+
     Raises
     ------
     ValueError
-        If there is none, or they are of different code.
+        If they are of different code, or a tracker has two rows of the same clip.
     """
     paths = sorted(folder.glob("part-*.csv.gz"))
     if not paths:
-        raise ValueError(f"{folder}: has no part of the suite: make one by python -m benchmarks.suite part 1")
+        names = (*IDENTITY, *ABOUT, *HASHES, RANKED_BY)
+        return pd.DataFrame({name: pd.Series(dtype=str if name in TEXT else float) for name in names})
     found = {path.name: _read(path) for path in paths}
     code = {name: table["code"].iloc[0] for name, table in found.items()}
     first = next(iter(code))
     if other := [name for name in code if code[name] != code[first]]:
         raise ValueError(f"{folder}: {other[0]} was made with other code than {first}: make both with the same")
-    return pd.concat(found.values(), ignore_index=True)
+    table = pd.concat(found, names=["file"]).reset_index("file")
+    again = table[table.duplicated([*CLIP, "tracker"])]
+    for file, tracker, case in again[["file", "tracker", "case"]].head(1).to_numpy():
+        raise ValueError(f"{folder / file}: the tracker {tracker} is in {case} a second time: remove one of its files")
+    return table.drop(columns="file").reset_index(drop=True)
 
 
 def _read(path: Path) -> pd.DataFrame:
@@ -117,6 +132,18 @@ def _read(path: Path) -> pd.DataFrame:
     # Only an empty number is missing: that nothing failed is "", and a variation is called none.
     table = pd.read_csv(path, dtype=dict.fromkeys(TEXT, str), keep_default_na=False, na_values=[""])
     return table.fillna(dict.fromkeys(TEXT, ""))
+
+
+def _further(trackers: Path, path: Path) -> dict[str, Any]:
+    """Further trackers of a YAML file, none of which is in another file of the part than `path`."""
+    given = read_yaml(trackers)
+    if not given:
+        raise ValueError(f"{trackers}: names no tracker: write a mapping of names to settings")
+    for file in sorted(path.parent.glob(f"{path.name[:7]}*.csv.gz")):
+        for name in given if file != path else ():
+            if name in set(_read(file)["tracker"]):
+                raise ValueError(f"{trackers}: the tracker {name} is in {file} already: give it another name")
+    return given
 
 
 def _kept(trackers: dict[str, Any] | None, heart: dict[str, Any]) -> list[Row]:
@@ -135,4 +162,7 @@ def _check_images(table: pd.DataFrame, before: pd.DataFrame) -> None:
     other = clips[0].index[(clips[0] != clips[1].reindex(clips[0].index)).to_numpy()]
     if len(other):
         case, view, size = other[0]
-        raise ValueError(f"{case} {view} {size} px: its images are not those of the part: make the part again")
+        raise ValueError(
+            f"{case} {view} {size} px: its images are not those of the part, by other code, packages or instructions "
+            "of the processor (docs/determinism.md): make the part again on this machine"
+        )

@@ -5,7 +5,7 @@ Unlike a run, truth is made at the points that are tracked alone, and labels at 
 
 from __future__ import annotations
 
-import time
+import resource
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -24,7 +24,7 @@ from echotruth.evaluation.clip import Clip, make_clip
 from echotruth.evaluation.clip_metrics import ClipTruth, clip_rows
 from echotruth.evaluation.curves import REFERENCE
 from echotruth.evaluation.point_tracks import SIDE
-from echotruth.evaluation.scoring import Truth, ground_truth, scored
+from echotruth.evaluation.scoring import Truth, estimated, ground_truth, scored_estimate
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.labels import unpack
@@ -81,14 +81,21 @@ def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
         clip = make_clip(case, view, images, labels[size], truth.inside)
         keys = one.sorts | {"view": view, "size_px": size} | _about(config, heart, view, clip)
         for name, settings in config.tracking.trackers.items():
-            began = time.process_time()
-            arrays, failures = scored(clip, truth, {name: settings})
-            own = {"tracker": name, "failure": failures.get(name, ""), "cpu_s": time.process_time() - began}
+            began = _cpu_time()
+            estimate, failure = estimated(clip, settings)
+            own = {"tracker": name, "failure": failure, "cpu_s": _cpu_time() - began}
+            arrays = {key: values[None] for key, values in scored_estimate(clip, truth, estimate).items()}
             stored = as_stored(case, {"tracking/SIZE": arrays})["tracking/SIZE"]
             row, segments, steps = clip_rows({key: values[0] for key, values in stored.items()}, points)
             tracking = config.tracking.model_copy(update={"trackers": {name: settings}})
             version = version_of("tracking", config.model_copy(update={"tracking": tracking}), view)
             yield keys | own | {"configuration": version} | row | packed_segments(segments) | packed_reliability(steps)
+
+
+def _cpu_time() -> float:
+    """User and system time of this process and of those that it started and that have ended, s."""
+    spent = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in spent)
 
 
 def imaged(case: Case, moving: Heart, plane: Plane, view: str) -> dict[int, np.ndarray]:

@@ -1,5 +1,8 @@
 """The suite: its hearts, the rows of a heart against those of a repository, and its parts."""
 
+import os
+import subprocess
+import sys
 from collections import Counter
 from hashlib import sha256
 
@@ -9,11 +12,13 @@ import pytest
 
 import echotruth as et
 from benchmarks.suite import __main__ as command
-from benchmarks.suite import columns, hearts, parts
+from benchmarks.suite import columns, hearts, parts, scores
 from benchmarks.suite.hearts import SuiteCase, cases_of, plan
 from benchmarks.suite.scores import view_rows
 from echotruth.config.imaging import ViewMotion
+from echotruth.extras import MissingPackage
 from echotruth.repository.version import motion_hash
+from echotruth.workflow import instructions
 
 GROUPS = {"healthy", "infarct", "late_activation", "hypertrophy", "dilation"}
 
@@ -140,8 +145,63 @@ def test_further_tracker_is_put_beside_a_part_with_the_same_images_alone(made, m
     parts.make_part(1, trackers=mine, say=lambda _: None)
     assert set(parts.read_parts(made)["tracker"]) == {"dis", "one", "other"}
     monkeypatch.setattr(parts, "heart_rows", lambda *given: rows_of(*given, images="j"))
-    with pytest.raises(ValueError, match="its images are not those of the part"):
+    with pytest.raises(ValueError, match=r"its images are not those of the part, by .* instructions"):
         parts.make_part(1, trackers=mine, say=lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("text", "refusal"),
+    [
+        ("", "mine.yaml: names no tracker"),
+        ("{}", "mine.yaml: names no tracker"),
+        ("- dis", "mine.yaml: contains a list"),
+        ("a: [", "mine.yaml, line 1: "),
+        ("dis: {method: dis}", "mine.yaml: the tracker dis is in .*part-01.csv.gz already"),
+        ("other: {method: dis}", "mine.yaml: the tracker other is in .*part-01-first.csv.gz already"),
+    ],
+)
+def test_file_without_a_new_tracker_is_refused(made, tmp_path, text, refusal):
+    first, mine = tmp_path / "first.yaml", tmp_path / "mine.yaml"
+    first.write_text("other: {method: dis}")
+    for _ in range(2):  # its own file may be made again
+        parts.make_part(1, trackers=first, say=lambda _: None)
+    mine.write_text(text)
+    with pytest.raises(ValueError, match=refusal):
+        parts.make_part(1, trackers=mine, say=lambda _: None)
+
+
+def test_rows_that_are_there_twice_are_refused(made):
+    (made / "part-01-copy.csv.gz").write_bytes((made / "part-01.csv.gz").read_bytes())
+    with pytest.raises(ValueError, match=r"part-01\.csv\.gz: the tracker dis is in mouse\d+ a second time"):
+        parts.read_parts(made)
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_version_is_of_the_files_of_the_suite_too(monkeypatch, tmp_path, place):
+    monkeypatch.setattr(hearts, "plan", lambda: plan()[:1])
+    before = hearts.suite_version.__wrapped__()
+    changed = tmp_path / "changed.py"
+    changed.write_bytes(hearts.FILES[place].read_bytes() + b"#")
+    monkeypatch.setattr(hearts, "FILES", tuple(changed if k == place else f for k, f in enumerate(hearts.FILES)))
+    assert hearts.suite_version.__wrapped__() != before
+
+
+def test_cost_is_that_of_this_process_and_of_those_that_it_started():
+    begun = scores._cpu_time()
+    busy = "import time\nwhile time.process_time() < 0.5: pass"
+    subprocess.run([sys.executable, "-c", busy], check=True)
+    assert scores._cpu_time() - begun == pytest.approx(0.5, abs=0.2)
+
+
+def test_command_runs_with_the_instructions_of_a_run(tmp_path):
+    other = {name: "" for name in instructions.environment()}
+    code = (
+        "import sys, runpy; from echotruth.workflow import instructions\n"
+        "if instructions.environment().items() <= __import__('os').environ.items(): sys.exit(7)\n"
+        "from benchmarks.suite import __main__ as command; command.set_instructions(); sys.exit(0)"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], env=os.environ | other, check=False)
+    assert ended.returncode == 7
 
 
 def test_parts_of_other_code_are_refused(made, monkeypatch):
@@ -155,3 +215,24 @@ def test_parts_of_other_code_are_refused(made, monkeypatch):
 def test_what_is_not_there_is_refused_in_one_line(made, monkeypatch, capsys, arguments):
     monkeypatch.setattr("sys.argv", ["suite", *arguments])
     assert command.main() == 2 and capsys.readouterr().err.count("\n") == 1
+
+
+def test_package_that_is_missing_is_told_in_one_line(made, monkeypatch, capsys):
+    def without(*_):
+        raise MissingPackage("model.onnx needs the package onnxruntime: pip install 'echotruth[onnx]'")
+
+    monkeypatch.setattr(parts, "make_part", without)
+    monkeypatch.setattr("sys.argv", ["suite", "part", "1"])
+    assert command.main() == 2 and capsys.readouterr().err.count("\n") == 1
+
+
+def test_page_without_parts_says_so_and_which_parts_a_rank_needs(tmp_path, monkeypatch):
+    monkeypatch.setattr(parts.read_parts, "__defaults__", (tmp_path,))
+    monkeypatch.setattr("sys.argv", ["suite", "page", "--page", str(tmp_path / "page.md")])
+    assert command.main() == 0
+    text = (tmp_path / "page.md").read_text()
+    assert "No part of the suite has been made yet" in text and "Numbers of hearts" not in text
+    table = pd.DataFrame(plan()).groupby(["split", "species"])["part"].agg(["min", "max"])
+    assert table.loc["develop"].to_numpy().tolist() == [[1, 2]] * 2 and "Parts 1\nand 2 are the half develop" in text
+    assert table.loc["test", "mouse"].tolist() == [3, 8] and "parts 3 to 8, the mice" in text
+    assert table.loc["test", "human"].tolist() == [9, 10] and "parts 9 and 10, the\npeople" in text

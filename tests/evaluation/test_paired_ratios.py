@@ -71,6 +71,12 @@ def test_hearts_too_few_for_five_percent_order_nobody_and_one_more_orders():
     assert np.array(rank_ranges(scores[:-1])).tolist() == [[1, 1], [2, 2]] and np.isinf([few.low, few.high]).all()
 
 
+@pytest.mark.filterwarnings("error")
+def test_no_heart_has_no_mean_and_no_end():
+    found = simultaneous_intervals(np.empty((0, 3)))
+    assert np.isnan(found.mean).all() and (found.low == -np.inf).all() and (found.high == np.inf).all()
+
+
 def test_ranges_of_ranks_leave_room_for_those_that_are_not_told_apart():
     random = np.random.default_rng(3)
     hearts = random.normal(3, 1, 24)

@@ -74,11 +74,11 @@ def simultaneous_intervals(differences: ArrayLike) -> Interval:
     Returns
     -------
     Interval
-        Infinite ends with fewer than `LEAST_HEARTS`.
+        Infinite ends with fewer than `LEAST_HEARTS`; no mean (NaN) with none.
     """
     values = np.asarray(differences, float)
     hearts, comparisons = values.shape
-    mean = values.mean(axis=0)
+    mean = values.mean(axis=0) if hearts else np.full(comparisons, np.nan)
     if hearts < LEAST_HEARTS or not comparisons:
         return Interval(mean, np.full(comparisons, -np.inf), np.full(comparisons, np.inf))
     residual = values - mean

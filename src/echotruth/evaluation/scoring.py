@@ -228,13 +228,26 @@ def scored(clip: Clip, truth: Truth, trackers: Mapping[str, Section]) -> tuple[d
     failures: dict[str, str] = {}
     for name, settings in trackers.items():
         log.info("%s", name)
-        try:
-            motion = clip.on_grid(*track(*clip.tracker_arguments, settings))
-        except TrackerFailed as error:
-            log.warning("%s: %s", name, error)
-            failures[name], motion = str(error), clip.on_grid(*clip.no_estimate)
-        found.append({"displacement": motion[0], "quality": motion[1]} | score(motion[0], truth))
+        estimate, failure = estimated(clip, settings)
+        if failure:
+            log.warning("%s: %s", name, failure)
+            failures[name] = failure
+        found.append(scored_estimate(clip, truth, estimate))
     return {name: np.stack([one[name] for one in found]) for name in found[0]}, failures
+
+
+def estimated(clip: Clip, settings: Section) -> tuple[tuple[np.ndarray, np.ndarray], str]:
+    """What a tracker finds in a clip, as :func:`.track` returns it, and why it failed, or ""."""
+    try:
+        return track(*clip.tracker_arguments, settings), ""
+    except TrackerFailed as error:
+        return clip.no_estimate, str(error)
+
+
+def scored_estimate(clip: Clip, truth: Truth, estimate: tuple[np.ndarray, np.ndarray]) -> dict[str, np.ndarray]:
+    """What :func:`scored` returns of one tracker, without the dimension of the trackers, given what it found."""
+    displacement, quality = clip.on_grid(*estimate)
+    return {"displacement": displacement, "quality": quality} | score(displacement, truth)
 
 
 def curves(displacement: np.ndarray, strain: np.ndarray, truth: Truth) -> dict[str, np.ndarray]:
