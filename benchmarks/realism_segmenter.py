@@ -186,8 +186,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--clip", type=Path, required=True)
     parser.add_argument("--folder", type=Path, default=HERE / ".cache/segmenter")
-    parser.add_argument("--number", type=int, default=4, help="of clips of each heart")
-    parser.add_argument("--steps", type=int, default=2000)
+    parser.add_argument("--number", type=int, default=8, help="of clips of each heart")
+    parser.add_argument("--steps", type=int, default=6000)
     given = parser.parse_args()
     made = clips(given.folder, given.number)
     known = [frame for (heart, _), frames in made.items() if heart not in LEFT_OUT for frame in frames]
