@@ -6,6 +6,7 @@ python -m benchmarks.suite page --split develop
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -151,7 +152,7 @@ class Page:
 
     def detections(self) -> str:
         """Areas under the curve of subtle infarcts in mice."""
-        found = {f"{size} px": detection(self._segments(size)) for size in self.sizes}
+        found = {f"{size} px": detection(segments) for size, segments in self._segments.items()}
         names = [*self.order, "true strain"]
         table = self._table("tracker", found, _area, names)
         counts = next(iter(found.values())).iloc[-1]
@@ -161,8 +162,8 @@ class Page:
     def recoveries(self) -> str:
         """What is left of differences between segments in hearts with an infarct."""
         found: dict[str, pd.Series] = {}
-        for size in self.sizes:
-            table = recovery(self._segments(size))
+        for size, segments in self._segments.items():
+            table = recovery(segments)
             found |= {f"{what} at {size} px": table[what] for what in ("contrast", "spread")}
         return self._table("tracker", found, lambda values, name: number(values.get(name, np.nan), 2))
 
@@ -201,8 +202,10 @@ class Page:
         curves = quality.curve(columns.reliability(self.mice))
         charts.draw_reliability(folder / "reliability.png", curves, self.order)
 
-    def _segments(self, size: int) -> pd.DataFrame:
-        return columns.segments(self.mice[self.mice["size_px"] == size])
+    @cached_property
+    def _segments(self) -> dict[int, pd.DataFrame]:
+        """Segments of mice, by image size."""
+        return {size: columns.segments(self.mice[self.mice["size_px"] == size]) for size in self.sizes}
 
     def _table(
         self, corner: str, found: dict[str, Any], text: Callable[[Any, str], str], names: Iterable[str] = ()
