@@ -1,8 +1,8 @@
 """Learn to tell hearts with an infarct, against a threshold of tracked strain and against the ejection fraction.
 
     pip install 'echotruth[torch]'
-    echotruth run config/learning.yaml
-    python examples/diagnosis.py out/learning
+    echotruth run config/infarcts.yaml
+    python examples/diagnosis.py out/infarcts
 
 The network sees end-diastole and end-systole unrolled about the centre of the wall, and learns where the infarct is,
 which the truth says at every pixel: a heart has one diagnosis, but 64 angles. Every heart is scored once, by a network

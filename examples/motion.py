@@ -1,8 +1,8 @@
 """Learn the motion between two frames, against no motion and against two trackers.
 
     pip install 'echotruth[torch]'
-    echotruth run config/learning.yaml
-    python examples/motion.py out/learning
+    echotruth run config/infarcts.yaml
+    python examples/motion.py out/infarcts
 
 The end-point error is the length of the difference of found and true motion, mean over the pixels of the wall and the
 pairs of frames of hearts that were not trained on. Trackers are given the wall, as always; the network is not.

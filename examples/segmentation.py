@@ -1,8 +1,8 @@
 """Learn to find the wall in single frames, against the mean wall and against the best blur and threshold.
 
     pip install 'echotruth[torch]'
-    echotruth run config/learning.yaml
-    python examples/segmentation.py out/learning
+    echotruth run config/infarcts.yaml
+    python examples/segmentation.py out/infarcts
 
 Dice = 2 |A and B| / (|A| + |B|), mean over the frames of hearts that were not trained on.
 """

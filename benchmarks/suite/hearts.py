@@ -64,6 +64,7 @@ TRACKERS: dict[str, dict[str, Any]] = {
     "dis": {"method": "dis"},
     "dis_fine": {"method": "dis", "preset": "fine"},
     "bspline_dic": {"method": "bspline_dic"},
+    "bspline_cnn": {"method": "bspline_cnn"},
 }
 WINDOW_MM = 1.5
 """Window of `corrected` in a mouse."""

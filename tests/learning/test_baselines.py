@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from echotruth import learning
+from echotruth.tracking.ray_network import read
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -65,6 +66,44 @@ def test_sector_that_does_not_shorten_is_found_among_others_that_do():
     dead = np.abs(angle) < 0.7
     after = np.where(dead[:, None], before, 0.8 * before)
     assert names["least_shortening"](before, after) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def rays(repository, hearts):
+    """The example of the ray network, and samples of a heart."""
+    names = example("ray_network")
+    return names, names["samples"](str(repository), hearts[0].index[0])
+
+
+@pytest.mark.slow
+def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_computed(rays, tmp_path):
+    import torch
+
+    names, found = rays
+    network = names["train"](found, epochs=40)
+    names["calibrate"](network, found)
+    assert names["ratios"](network, found)[:, 0].mean() < 0.9
+    names["write"](network, tmp_path / "weights.npz")
+    correction, deviation = read(tmp_path / "weights.npz")(found[0].channels)
+    with torch.no_grad():
+        expected, log_deviation = network(torch.from_numpy(found[0].channels)[None])
+    np.testing.assert_allclose(correction.transpose(3, 1, 0, 2), expected[0], atol=0.02)  # weights of half precision
+    np.testing.assert_allclose(np.log(deviation).transpose(1, 0, 2), log_deviation[0], atol=0.02)
+
+
+@pytest.mark.slow
+def test_ray_network_sees_a_mirrored_heart_as_a_heart_whose_motion_is_mirrored(rays):
+    names, found = rays
+    given = names["batch"](found[:1])
+    other = names["mirrored"](given)
+    for measure in ("strain_error", "relative_error"):
+        np.testing.assert_allclose(
+            names[measure](other["tracked"], other), names[measure](given["tracked"], given), rtol=1e-4
+        )
+    for name, values in names["mirrored"](other).items():
+        np.testing.assert_array_equal(values, given[name])
+    cosine = names["ODD"][0]
+    assert (given["channels"][0, cosine] == other["channels"][0, cosine]).float().mean() > 0.5  # the ray at pi - a
 
 
 @pytest.mark.slow

@@ -124,6 +124,20 @@ class BsplineDic(Section):
     ] = "bidirectional"
 
 
+class BsplineCnn(BsplineDic):
+    """`bspline_dic` and a network that corrects its motion, which has learned from hearts of other settings."""
+
+    method: Literal["bspline_cnn"] = "bspline_cnn"  # type: ignore[assignment]
+    """Name of the method."""
+    weights: str | None = None
+    """File of weights that `examples/ray_network.py` wrote. Default: those that come with echotruth."""
+
+    @property
+    def files(self) -> list[str]:
+        """The weights, if they are not those of the package."""
+        return [self.weights] if self.weights else []
+
+
 class Dis(Section):
     """Dense inverse search of OpenCV, unmodified."""
 
@@ -270,7 +284,16 @@ class Onnx(Section):
 OUTSIDE = (External, Onnx)
 """Sections of trackers from outside the package."""
 
-METHODS: tuple[type[Section], ...] = (PhaseCorrelation, WindowDeformation, AffineDic, BsplineDic, Dis, Ilk, *OUTSIDE)
+METHODS: tuple[type[Section], ...] = (
+    PhaseCorrelation,
+    WindowDeformation,
+    AffineDic,
+    BsplineDic,
+    BsplineCnn,
+    Dis,
+    Ilk,
+    *OUTSIDE,
+)
 """Sections of all methods of tracking."""
 
 DEFAULT = "phase_correlation"

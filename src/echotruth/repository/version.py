@@ -113,7 +113,7 @@ def code_hash(stage: str) -> str:
     for part in CODE[stage]:
         path = PACKAGE / part
         files = sorted(path.rglob("*")) if path.is_dir() else [path]
-        for file in (file for file in files if file.suffix in (".py", ".csv") and file not in left_out):
+        for file in (file for file in files if file.suffix in (".py", ".csv", ".npz") and file not in left_out):
             digest.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
     return digest.hexdigest()[:16]
 

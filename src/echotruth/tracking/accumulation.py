@@ -60,6 +60,9 @@ class Path:
     unseen : ndarray of shape (frame, n), optional
         From 0 to 1: how far the image shows no tissue at the point, which then moves with what is around it. None of a
         tracker that does not tell.
+    deviation : ndarray of shape (frame, n), optional
+        Standard deviation of the error along each axis, px, of a tracker that tells it; the quality follows from it
+        alone.
     """
 
     displacement: np.ndarray
@@ -67,6 +70,7 @@ class Path:
     variance: np.ndarray
     disagreement: np.ndarray
     unseen: np.ndarray | None = None
+    deviation: np.ndarray | None = None
 
 
 def accumulate(

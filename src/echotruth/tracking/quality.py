@@ -63,11 +63,7 @@ class ErrorModel:
         ndarray of shape (frame, n)
             From 0 to 1; 1 at frame 0, NaN where the point is lost.
         """
-        terms = squares(path, speckle, shape)
-        probability = within(1.0, self.variance(terms))
-        probability[0] = 1.0
-        probability[~np.isfinite(path.displacement).all(-1)] = np.nan
-        return probability
+        return _of_path(path, self.variance(squares(path, speckle, shape)))
 
     def variance(self, terms: "Squares") -> np.ndarray:
         """s^2 of points, in squares of 1/256 of the longer side of the image; the shape is that of the terms."""
@@ -136,6 +132,20 @@ def error_name(settings: Any) -> str:
     variants = (getattr(settings, "reference", None), getattr(settings, "preset", None))
     special = [f"{settings.method}_{variant}" for variant in variants]
     return next((name for name in special if name in ERRORS), settings.method)
+
+
+def told_probability(path: Path, shape: tuple[int, ...]) -> np.ndarray:
+    """:meth:`ErrorModel.probability` of a tracker that tells the deviation of its error."""
+    assert path.deviation is not None
+    return _of_path(path, (path.deviation / (IMAGE_FRACTION * max(shape))) ** 2)
+
+
+def _of_path(path: Path, variance: np.ndarray) -> np.ndarray:
+    """Probability (frame, n) by the variance of the error, in squares of 1/256 of the side of the image."""
+    probability = within(1.0, variance)
+    probability[0] = 1.0
+    probability[~np.isfinite(path.displacement).all(-1)] = np.nan
+    return probability
 
 
 def within(radius: float, variance: np.ndarray) -> np.ndarray:

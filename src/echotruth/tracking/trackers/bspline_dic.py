@@ -27,14 +27,14 @@ Image and template are blurred at first, so that a motion beyond the size of a s
 template is kept until its correlation with the tissue falls below `template_update_ncc`. Where tissue is not seen, as
 in a shadow that shows noise alone (:mod:`.visibility`), the clip is tracked once more without the pixels there: the
 energy carries the motion of the tissue around into it. That the cycle closes is no term of J: if it does
-(:mod:`.closure`), the clip is tracked from end-diastole both forwards and backwards, and :func:`combine` takes the mean
-of the two with weights from their variances.
+(:mod:`.closure`), the clip is tracked from end-diastole both forwards and backwards, and :class:`BothWays` takes the
+mean of the two with weights from their variances.
 """
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise
 
 import cv2
@@ -105,10 +105,18 @@ class WallTrajectory:
 
 def track(clip: TrackerInput, settings: BsplineDic) -> Path:
     """Path of the points of a clip; those outside the wall and its surroundings are lost."""
+    return lost(clip) if not clip.mask.any() else follow(clip, settings).path
+
+
+def lost(clip: TrackerInput) -> Path:
+    """Path of points of which none is found."""
+    unknown = np.full((len(clip.frames), len(clip.points)), np.nan)
+    return Path(np.stack([unknown, unknown], -1), unknown, unknown, unknown)
+
+
+def follow(clip: TrackerInput, settings: BsplineDic) -> "BothWays":
+    """Track the wall of a clip, which must have some, both ways or forwards only."""
     mask, spacing = clip.mask, clip.spacing
-    if not mask.any():
-        unknown = np.full((len(clip.frames), len(clip.points)), np.nan)
-        return Path(np.stack([unknown, unknown], -1), unknown, unknown, unknown)
     values = settings.si()
     blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.speckle_pixel / spacing) ** 2))
     knot_spacing = max(values.knots / spacing, MIN_KNOT_SPACING)
@@ -147,11 +155,9 @@ def track(clip: TrackerInput, settings: BsplineDic) -> Path:
         visible = visibility(likeness, mask.shape, knot_spacing / BLOCKS_PER_KNOT, BLOCKS_PER_KNOT)
         in_wall = region.positions[region.inside]
         if 1 - visible.at(in_wall).mean() < LEAST_UNSEEN:
-            return combine(region, clip.points, trajectories[0], trajectories[-1])
+            return BothWays(region, clip.points, trajectories[0], trajectories[-1])
         trajectories = list(threads.map(replace(tracker, visible=visible).track, orders))
-    path = combine(region, clip.points, trajectories[0], trajectories[-1])
-    position = clip.points + np.nan_to_num(path.displacement)
-    return replace(path, unseen=1 - visible.at(position.reshape(-1, 2)).reshape(path.correlation.shape))
+    return BothWays(region, clip.points, trajectories[0], trajectories[-1], visible)
 
 
 def gaussian(image: np.ndarray, deviation: float) -> np.ndarray:
@@ -306,33 +312,55 @@ class WallTracker:
         return min(fields, key=difference)
 
 
-def combine(region: WallRegion, points: np.ndarray, forward: WallTrajectory, backward: WallTrajectory) -> Path:
-    """Inverse-variance weighted mean of two trajectories, which may be the same.
+@dataclass(frozen=True)
+class BothWays:
+    """The wall tracked forwards and backwards.
 
-    Parameters
+    Attributes
     ----------
     region : WallRegion
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px.
     forward, backward : WallTrajectory
-
-    Returns
-    -------
-    Path
-        The weights are those of whole frames; the variance is that of the correlation around each point.
+        The same if it is tracked forwards only.
+    visible : Visibility, optional
+        Where tissue is seen. None: everywhere.
     """
-    weight = bidirectional.inverse_variance_weight(forward.variance, backward.variance)[:, None]
-    ways = [_displacement(region, points, trajectory) for trajectory in (forward, backward)]
-    displacement = bidirectional.weighted_mean(weight[..., None], *ways)
-    correlation = bidirectional.weighted_mean(weight, np.maximum(forward.ncc, 0), np.maximum(backward.ncc, 0))
-    correlation[0] += 1 - correlation[0]
-    displacement[np.isnan(correlation)] = np.nan
-    if forward is backward:
-        variance, disagreement = forward.decorrelation, np.full_like(correlation, np.nan)
-    else:
-        variance = bidirectional.mean_variance(weight, forward.decorrelation, backward.decorrelation)
-        disagreement = np.hypot(*np.moveaxis(ways[0] - ways[1], -1, 0))
-    return Path(displacement, correlation, variance, disagreement)
+
+    region: WallRegion
+    points: np.ndarray
+    forward: WallTrajectory
+    backward: WallTrajectory
+    visible: Visibility | None = None
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """Weight (frame,) of the way forwards in the mean of both, from their variances."""
+        return bidirectional.inverse_variance_weight(self.forward.variance, self.backward.variance)
+
+    @cached_property
+    def displacements(self) -> list[np.ndarray]:
+        """Displacement (frame, n, 2) of the points by each way, px."""
+        return [_displacement(self.region, self.points, way) for way in (self.forward, self.backward)]
+
+    @property
+    def path(self) -> Path:
+        """The mean of both ways; its variance is that of the correlation around each point."""
+        forward, backward, weight = self.forward, self.backward, self.weight[:, None]
+        displacement = bidirectional.weighted_mean(weight[..., None], *self.displacements)
+        correlation = bidirectional.weighted_mean(weight, np.maximum(forward.ncc, 0), np.maximum(backward.ncc, 0))
+        correlation[0] += 1 - correlation[0]
+        displacement[np.isnan(correlation)] = np.nan
+        if forward is backward:
+            variance, disagreement = forward.decorrelation, np.full_like(correlation, np.nan)
+        else:
+            variance = bidirectional.mean_variance(weight, forward.decorrelation, backward.decorrelation)
+            disagreement = np.hypot(*np.moveaxis(self.displacements[0] - self.displacements[1], -1, 0))
+        path = Path(displacement, correlation, variance, disagreement)
+        if self.visible is None:
+            return path
+        position = self.points + np.nan_to_num(displacement)
+        return replace(path, unseen=1 - self.visible.at(position.reshape(-1, 2)).reshape(correlation.shape))
 
 
 def _displacement(region: WallRegion, points: np.ndarray, trajectory: WallTrajectory) -> np.ndarray:

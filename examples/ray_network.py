@@ -1,0 +1,276 @@
+"""Learn to correct the tracker `bspline_dic`: the weights of `bspline_cnn`.
+
+    pip install 'echotruth[torch]'
+    echotruth run config/learning.yaml
+    echotruth run config/learning_human.yaml
+    python examples/ray_network.py out/learning out/learning_human -o ray_network.npz
+
+Every clip of every size is tracked, one in four at half its frame rate, and the network learns what is missing to the
+true motion and how far it is still off. Hearts that are held out tell how much better it is and how sure it may be; the
+weights are of the last step. A configuration takes them by `weights: ray_network.npz`.
+"""
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+import torch
+from torch import nn
+
+import echotruth as et
+from echotruth import learning
+from echotruth.tracking.ray_network import DILATIONS, LARGEST_DEVIATION, LEAST_DEVIATION, OUTPUTS, PHASES
+from echotruth.tracking.tracker_input import TrackerInput
+from echotruth.tracking.trackers.bspline_cnn import SHARES, on_rays, over_phases, ray_features
+from echotruth.tracking.wall_rays import DEPTHS, RAYS
+
+WIDTH, BATCH, EPOCHS = 64, 8, 30
+FRACTIONS = {"train": 0.85, "test": 0.15}
+ODD = (6 * DEPTHS + 2 * len(SHARES) + 2, 6 * DEPTHS + 2 * len(SHARES) + 5)
+STRAIN_RAYS, STRAIN_WEIGHT, DEVIATION_WEIGHT = 4, 0.3, 0.1
+"""Rays between the ends of the lines whose strain counts, and weights of terms of the loss."""
+MIRRORED_CHANNELS = [*range(DEPTHS, 2 * DEPTHS), *range(3 * DEPTHS, 4 * DEPTHS), *ODD]
+"""Channels that change their sign in a mirror: components across the rays, and those of the direction of the beam."""
+LEARNING_RATE, WEIGHT_DECAY = 1e-3, 0.1
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A clip: what the network is given, and what is true.
+
+    Attributes
+    ----------
+    case, view : str
+    channels : ndarray of shape (channel, PHASES, RAYS)
+    tracked, true : ndarray of shape (2, DEPTHS, PHASES, RAYS)
+        Displacement along and across the rays by `bspline_dic` and the true one, over the scale of the motion.
+    start : ndarray of shape (2, DEPTHS, RAYS)
+        Places at end-diastole, along and across the ray, likewise.
+    known : ndarray of shape (DEPTHS, RAYS)
+        1 where the motion is known, else 0.
+    """
+
+    case: str
+    view: str
+    channels: np.ndarray
+    tracked: np.ndarray
+    true: np.ndarray
+    start: np.ndarray
+    known: np.ndarray
+
+
+def samples(folder: str, case: str) -> list[Sample]:
+    """Samples of all clips of a case."""
+    repository = et.Repository(folder)
+    config, heart = repository.case(case).config, repository.heart(case)
+    found = []
+    for view in config.views:
+        for size in config.bmode.sizes:
+            clip = repository.clip(case, view, size)
+            step = 2 if crc32(f"{case} {view} {size}".encode()) % 4 == 0 else 1
+            found.append(sample(case, view, heart, clip, step))
+    return found
+
+
+def sample(case, view, heart, clip, step):
+    """Sample of a clip, of which every frame or every second is used."""
+    config = heart.config
+    images, mask, times = (clip[each].values for each in ("image", "mask", "time"))
+    spacing = config.bmode.si().field_of_view / mask.shape[-1]
+    given = TrackerInput(images[::step], np.zeros((0, 2)), mask[0].astype(bool), spacing, times[::step], 0)
+    settings = et.configure(config, tracking={"trackers": {"cnn": {"method": "bspline_cnn"}}})
+    features, _ = ray_features(given, settings.tracking.trackers["cnn"])
+    rays, nodes = features.rays, features.rays.points.reshape(-1, 2)
+    true = et.point_tracks(heart, clip, nodes)["pixel"].values[::step] - nodes
+    known = np.isfinite(true).all((0, 2)).reshape(DEPTHS, RAYS) & rays.crosses
+    moved = rays.along_and_across(on_rays(true))
+    tracked, moved = (over_phases(each).transpose(3, 1, 0, 2) for each in (features.displacement, moved))
+    start = np.moveaxis(rays.along_and_across(rays.points - rays.centre), -1, 0)
+    arrays = features.channels, *(each / features.scale for each in (tracked, moved, start)), known
+    return Sample(case, view, *(each.astype(np.float32) for each in arrays))
+
+
+class RayNetwork(nn.Module):
+    """The network of `echotruth.tracking.ray_network`."""
+
+    def __init__(self, channels, width=WIDTH):
+        super().__init__()
+        self.first, self.last = nn.Conv2d(channels, width, 1), nn.Conv2d(width, OUTPUTS, 1)
+        self.layers = nn.ModuleList(nn.Conv2d(width, width, 3, dilation=dilation) for dilation in DILATIONS)
+        nn.init.zeros_(self.last.weight)
+        nn.init.zeros_(self.last.bias)
+
+    def forward(self, channels):
+        """Correction (batch, 2, DEPTHS, PHASES, RAYS) and log deviation (batch, DEPTHS, PHASES, RAYS)."""
+        values = self.first(channels)
+        for layer, (phases, rays) in zip(self.layers, DILATIONS, strict=True):
+            around = nn.functional.pad(values, (rays, rays, phases, phases), mode="circular")
+            values = values + torch.relu(layer(around))
+        output = self.last(values)
+        correction = output[:, : 2 * DEPTHS].reshape(-1, DEPTHS, 2, PHASES, RAYS).transpose(1, 2)
+        return correction - correction[..., :1, :], output[:, 2 * DEPTHS :]
+
+
+def batch(chosen):
+    """Arrays of some samples as tensors, by name."""
+    names = ("channels", "tracked", "true", "start", "known")
+    return {name: torch.from_numpy(np.stack([getattr(one, name) for one in chosen])) for name in names}
+
+
+def mirrored(given):
+    """A batch left to right: the ray at an angle a is then at pi - a, and components across rays change their sign."""
+    ray = (RAYS // 2 - torch.arange(RAYS)) % RAYS
+    found = {name: values[..., ray] for name, values in given.items()}
+    found["channels"][:, MIRRORED_CHANNELS] *= -1
+    for name in ("tracked", "true", "start"):
+        found[name][:, 1] *= -1
+    return found
+
+
+def relative_error(moved, given):
+    """RMS error over the RMS motion, of each clip, all phases together."""
+    known = given["known"][:, :, None]
+    squares = (((values**2).sum(1) * known).sum((1, 2, 3)) for values in (moved - given["true"], given["true"]))
+    error, motion = squares
+    return torch.sqrt(error / motion.clamp(min=1e-9) + 1e-9)
+
+
+def strain(moved, given):
+    """Strain (batch, DEPTHS, PHASES, RAYS) of lines from each ray to one beside it."""
+    angle = 2 * np.pi * torch.arange(RAYS) / RAYS
+    cosine, sine = torch.cos(angle), torch.sin(angle)
+
+    def length(local):
+        along, across = local[:, 0], local[:, 1]
+        place = torch.stack([along * cosine - across * sine, along * sine + across * cosine], 1)
+        return (place.roll(-STRAIN_RAYS, -1) - place).pow(2).sum(1).clamp(min=1e-6).sqrt()
+
+    start = given["start"][:, :, :, None]
+    return length(start + moved) / length(start.expand_as(moved)) - 1
+
+
+def strain_error(moved, given):
+    """RMS error of the strain over the RMS strain, of each clip."""
+    known = (given["known"] * given["known"].roll(-STRAIN_RAYS, -1))[:, :, None]
+    true = strain(given["true"], given)
+    error, size = (((each**2) * known).sum((1, 2, 3)) for each in (strain(moved, given) - true, true))
+    return torch.sqrt(error / size.clamp(min=1e-4) + 1e-9)
+
+
+def surprise(moved, log_deviation, given):
+    """Mean negative log likelihood of the error, Gaussian with the deviation that is stated, of each clip.
+
+    It moves the deviation alone: the motion is fitted by its error, which clips of large motion do not outweigh.
+    """
+    squares = ((moved.detach() - given["true"]) ** 2).sum(1)
+    known = given["known"][:, :, None].expand_as(squares)
+    log_deviation = log_deviation.clamp(np.log(LEAST_DEVIATION), np.log(LARGEST_DEVIATION))
+    loss = 2 * log_deviation + squares / 2 * torch.exp(-2 * log_deviation)
+    return (loss * known).sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp(min=1)
+
+
+def train(chosen, epochs=EPOCHS, seed=0):
+    """A network trained on samples."""
+    torch.manual_seed(seed)
+    random, network = np.random.default_rng(seed), RayNetwork(len(chosen[0].channels))
+    steps = torch.optim.AdamW(network.parameters(), weight_decay=WEIGHT_DECAY)
+    per_epoch = max(1, len(chosen) // BATCH)
+    pace = torch.optim.lr_scheduler.OneCycleLR(steps, LEARNING_RATE, total_steps=epochs * per_epoch)
+    for epoch in range(epochs):
+        order, losses = random.permutation(len(chosen)), []
+        for number in range(per_epoch):
+            given = batch([chosen[index] for index in order[number * BATCH : (number + 1) * BATCH]])
+            given = mirrored(given) if random.random() < 0.5 else given
+            correction, log_deviation = network(given["channels"])
+            moved = given["tracked"] + correction
+            loss = relative_error(moved, given) + STRAIN_WEIGHT * strain_error(moved, given)
+            loss = (loss + DEVIATION_WEIGHT * surprise(moved, log_deviation, given)).mean()
+            steps.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+            steps.step()
+            pace.step()
+            losses.append(loss.item())
+        print(f"epoch {epoch + 1} of {epochs}: loss {np.mean(losses):.3f}", flush=True)
+    return network.eval()
+
+
+def write(network, path):
+    """Write the weights, in half precision, as `bspline_cnn` reads them."""
+    layers = network.layers
+    arrays = {
+        "first": network.first.weight[:, :, 0, 0],
+        "first_bias": network.first.bias,
+        "layers": torch.stack([layer.weight for layer in layers]),
+        "biases": torch.stack([layer.bias for layer in layers]),
+        "last": network.last.weight[:, :, 0, 0],
+        "last_bias": network.last.bias,
+    }
+    np.savez_compressed(path, **{name: values.detach().numpy().astype(np.float16) for name, values in arrays.items()})
+
+
+def calibrate(network, held_out):
+    """Multiply the deviations by one number, so that those of hearts that are held out are as large as their errors.
+
+    A network is surer of the hearts that it was trained on. The number is the geometric mean over the clips.
+    """
+    logs = []
+    for one in held_out:
+        given = batch([one])
+        with torch.no_grad():
+            correction, log_deviation = network(given["channels"])
+        squares = ((given["tracked"] + correction - given["true"]) ** 2).sum(1) / 2
+        known = given["known"][:, :, None].expand_as(squares) > 0
+        logs.append(torch.log((squares * torch.exp(-2 * log_deviation))[known].mean()).item())
+    with torch.no_grad():
+        network.last.bias[2 * DEPTHS :] += np.mean(logs) / 2
+
+
+def ratios(network, held_out):
+    """Error of the corrected motion over that of `bspline_dic`, and likewise of strain, (sample, 2)."""
+    found = []
+    for one in held_out:
+        given = batch([one])
+        with torch.no_grad():
+            moved = given["tracked"] + network(given["channels"])[0]
+        measures = (relative_error, strain_error)
+        found.append([(measure(moved, given) / measure(given["tracked"], given)).item() for measure in measures])
+    return np.array(found)
+
+
+def all_samples(cases):
+    """Samples of cases, given with the folders of their repositories, in as many processes as there are cores."""
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as processes:
+        jobs = [processes.submit(samples, *case) for case in cases]
+        for number, (job, (folder, case)) in enumerate(zip(jobs, cases, strict=True), 1):
+            print(f"{number} of {len(cases)}: {folder} {case}", flush=True)
+            yield from job.result()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("repository", nargs="+", help="folder of a repository")
+    parser.add_argument("-o", "--output", type=Path, default=Path("ray_network.npz"), help="file of the weights")
+    given = parser.parse_args()
+    parts = {name: [] for name in FRACTIONS}
+    for folder in given.repository:
+        for name, hearts in learning.split(learning.cases(folder, "status == 'complete'"), FRACTIONS, seed=1).items():
+            parts[name] += [(folder, case) for case in hearts.index]
+    if not all(parts.values()):
+        parser.error(f"{len(parts['train'])} hearts to train on and {len(parts['test'])} held out: make more hearts")
+    chosen, held_out = (list(all_samples(parts[name])) for name in ("train", "test"))
+    network = train(chosen)
+    calibrate(network, held_out)
+    write(network, given.output)
+    for view in dict.fromkeys(one.view for one in held_out):
+        motion, lines = np.exp(np.log(ratios(network, [one for one in held_out if one.view == view])).mean(0))
+        print(f"{view}: error over that of bspline_dic {motion:.2f}, of strain {lines:.2f}")
+    print(f"trained on {len(parts['train'])} hearts, {len(parts['test'])} held out: {given.output}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,165 @@
+"""`bspline_dic`, whose motion a network corrects that has learned from hearts of which the true motion is known.
+
+The wall is cut by rays from the middle of the cavity (:mod:`echotruth.tracking.wall_rays`). At points of these rays the
+network is given the displacement, how far both ways are apart and how well images match along them, and the brightness
+that follows each point: where a border of the wall is lost, it changes. It tells what has to be added and how far the
+sum is still off (:mod:`echotruth.tracking.ray_network`). Between the points, and between phases of the cycle, the
+correction is interpolated linearly.
+"""
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path as File
+
+import cv2
+import numpy as np
+
+from echotruth.config.tracking import BsplineCnn
+from echotruth.tracking.accumulation import Path
+from echotruth.tracking.flow import interpolate_field
+from echotruth.tracking.grey import amplitudes, even_gain, rms
+from echotruth.tracking.ray_network import PHASES, read
+from echotruth.tracking.tracker_input import TrackerInput
+from echotruth.tracking.trackers.bspline_dic import BothWays, follow, lost
+from echotruth.tracking.wall_rays import ANGLES, DEPTHS, DIRECTIONS, RAYS, WallRays, wall_rays
+
+WEIGHTS = File(__file__).with_suffix(".npz")
+"""Weights that come with the package; docs/tracking.md says from which hearts."""
+SHARES = np.array([-0.3, -0.1, 0.1, 0.5, 0.9, 1.1, 1.3])
+"""Where brightness is looked at along a ray: 0 at the endocardium, 1 at the epicardium."""
+BLUR = 0.12
+"""Standard deviation of the blur of that brightness, over the thickness of the wall."""
+LARGEST = 3.0
+"""Largest displacement and difference of both ways that the network is told, over the scale: one that has gone astray
+in black images may be anywhere."""
+LEAST_SCALE = 0.1
+"""Scale of a motion at least, over the thickness of the wall."""
+
+
+@dataclass(frozen=True)
+class RayFeatures:
+    """What the network is given of a clip.
+
+    Attributes
+    ----------
+    channels : ndarray of shape (channel, PHASES, RAYS), float32
+    displacement : ndarray of shape (frame, DEPTHS, RAYS, 2)
+        Of `bspline_dic`, along and across the ray, px.
+    rays : WallRays
+    scale : float
+        RMS displacement of the points in the frame where it is largest, px; `LEAST_SCALE` of the wall at least.
+    """
+
+    channels: np.ndarray
+    displacement: np.ndarray
+    rays: WallRays
+    scale: float
+
+
+def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
+    """Path of the points of a clip; its deviation is what the network says."""
+    if not clip.mask.any():
+        nothing = lost(clip)
+        return replace(nothing, deviation=nothing.variance)
+    features, path = ray_features(clip, settings)
+    rays, frames = features.rays, len(clip.frames)
+    correction, deviation = read(settings.weights or WEIGHTS)(features.channels)
+    values = features.scale * np.concatenate([rays.in_image(correction), deviation[..., None]], -1)
+    at_points = rays.interpolate(np.moveaxis(values, 0, 2), clip.points)
+    found = over_frames(np.moveaxis(at_points, 1, 0), frames)
+    return replace(path, displacement=path.displacement + found[..., :2], deviation=found[..., 2])
+
+
+def ray_features(clip: TrackerInput, settings: BsplineCnn) -> tuple[RayFeatures, Path]:
+    """Input of the network for a clip, and the path of its points by `bspline_dic`.
+
+    Raises
+    ------
+    ValueError
+        If the wall surrounds no cavity.
+    """
+    rays = wall_rays(clip.mask)
+    nodes = rays.points.reshape(-1, 2)
+    ways = follow(replace(clip, points=np.concatenate([nodes, clip.points])), settings)
+    path = ways.path
+    displacement = rays.along_and_across(on_rays(path.displacement))
+    length = np.sqrt((displacement[:, :, rays.crosses] ** 2).sum(-1).mean((1, 2)).max())
+    scale = max(float(length), LEAST_SCALE * float((rays.outer - rays.inner)[rays.crosses].mean()))
+    channels = [*_motion(rays, ways, displacement, scale), *_brightness(rays, clip, settings, displacement)]
+    channels += _circumstances(rays, ways, path, scale)
+    given = np.stack([np.broadcast_to(each, (len(clip.frames), RAYS)) for each in channels], 1) * rays.crosses
+    features = RayFeatures(over_phases(given).swapaxes(0, 1).astype(np.float32), displacement, rays, scale)
+    return features, _of_points(path, slice(len(nodes), None))
+
+
+def _of_points(path: Path, points: slice) -> Path:
+    """Path of some of the points."""
+    names = [each.name for each in fields(Path) if getattr(path, each.name) is not None]
+    return replace(path, **{name: getattr(path, name)[:, points] for name in names})
+
+
+def on_rays(values: np.ndarray) -> np.ndarray:
+    """Values (frame, n, ...), whose first points are those of the rays, as (frame, DEPTHS, RAYS, ...); 0 for NaN."""
+    return np.nan_to_num(values[:, : DEPTHS * RAYS]).reshape(len(values), DEPTHS, RAYS, *values.shape[2:])
+
+
+def over_phases(values: np.ndarray) -> np.ndarray:
+    """Values (frame, ...) of a cycle at `PHASES` phases of it, (PHASES, ...)."""
+    return _resampled(values, PHASES)
+
+
+def over_frames(values: np.ndarray, frames: int) -> np.ndarray:
+    """Values (PHASES, ...) at the frames of a clip of the cycle, (frames, ...)."""
+    return _resampled(values, frames)
+
+
+def _resampled(values: np.ndarray, number: int) -> np.ndarray:
+    """Values along the first axis, which is periodic, at another number of equal steps, by linear interpolation."""
+    place = np.arange(number) * len(values) / number
+    first = place.astype(int)
+    between = (place - first).reshape(-1, *(1,) * (values.ndim - 1))
+    return (1 - between) * values[first] + between * values[(first + 1) % len(values)]
+
+
+def _motion(rays: WallRays, ways: BothWays, displacement: np.ndarray, scale: float) -> list[np.ndarray]:
+    """Channels (frame, ray) of each depth: displacement, difference of both ways, correlations of both."""
+    forward, backward = map(on_rays, ways.displacements)
+    vectors = np.concatenate([displacement, rays.along_and_across(forward - backward)], -1) / scale
+    vectors = np.clip(vectors, -LARGEST, LARGEST)
+    correlations = np.stack([on_rays(way.ncc) for way in (ways.forward, ways.backward)], -1)
+    values = np.concatenate([vectors, correlations], -1)
+    return [values[:, depth, :, kind] for kind in range(values.shape[-1]) for depth in range(DEPTHS)]
+
+
+def _brightness(rays: WallRays, clip: TrackerInput, settings: BsplineCnn, displacement: np.ndarray) -> list[np.ndarray]:
+    """Channels (frame, ray): amplitude at end-diastole at each of `SHARES`, and how it has changed since, there.
+
+    The amplitude has even gain and is over its RMS in the wall.
+    """
+    values, thickness = settings.si(), rays.outer - rays.inner
+    blur = BLUR * float(thickness[rays.crosses].mean())
+    start = rays.centre + (rays.inner + SHARES[:, None] * thickness)[..., None] * DIRECTIONS
+    nearest = np.clip((SHARES * DEPTHS).astype(int), 0, DEPTHS - 1)
+    position = start + rays.in_image(displacement)[:, nearest]
+    typical, seen = 0.0, []
+    for frame, places in zip(clip.frames, position, strict=True):
+        amplitude = np.nan_to_num(amplitudes(frame[None], values.dynamic_range)[0])
+        typical = typical or rms(amplitude[clip.mask]) or 1.0
+        even = even_gain(amplitude, values.gain / clip.spacing, typical) if values.gain else amplitude
+        blurred = cv2.GaussianBlur(even, (0, 0), blur, borderType=cv2.BORDER_REFLECT) / typical
+        inside = np.clip(places.reshape(-1, 2), 0, np.array(clip.shape[::-1]) - 1)
+        seen.append(interpolate_field(blurred[..., None], inside).reshape(len(SHARES), RAYS))
+    brightness = np.array(seen)
+    return [*brightness[0], *np.moveaxis(brightness - brightness[0], 1, 0)]
+
+
+def _circumstances(rays: WallRays, ways: BothWays, path: Path, scale: float) -> list[np.ndarray]:
+    """Channels that broadcast to (frame, ray): what is seen, direction of the beam, phase, sizes, and the two ways."""
+    frames = len(path.displacement)
+    unseen = np.zeros(1) if path.unseen is None else on_rays(path.unseen).mean(1)
+    phase = 2 * np.pi * np.arange(frames)[:, None] / frames
+    thickness, radius = rays.outer - rays.inner, float((rays.inner + rays.outer)[rays.crosses].mean()) / 2
+    typical = float(thickness[rays.crosses].mean())
+    beam = [np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)]
+    sizes = [thickness / radius, rays.inner / radius, np.log([typical / 20]), np.log([scale / typical])]
+    both = np.ones(1) * (ways.forward is not ways.backward)
+    return [unseen, np.ones(1), *beam, ways.weight[:, None], np.cos(phase), np.sin(phase), *sizes, both]

@@ -1,0 +1,103 @@
+import numpy as np
+import pytest
+
+from echotruth.config.tracking import BsplineCnn, BsplineDic
+from echotruth.tracking import TrackerFailed, track
+from echotruth.tracking.ray_network import DILATIONS, OUTPUTS, PHASES
+from echotruth.tracking.tracker_input import TrackerInput
+from echotruth.tracking.trackers.bspline_cnn import over_frames, over_phases, ray_features
+from echotruth.tracking.wall_rays import DEPTHS, RAYS
+
+SIZE, SPACING, FRAMES, WIDTH = 128, 25e-6, 6, 4
+MIDDLE = np.array([63.5, 63.5])
+
+
+@pytest.fixture(scope="module")
+def ring():
+    """Ring about the middle of the image, and points in it."""
+    column, row = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
+    radius = np.hypot(column - MIDDLE[0], row - MIDDLE[1])
+    mask = (radius > 22) & (radius < 48)
+    return mask, np.argwhere(mask)[::41, ::-1].astype(float)
+
+
+@pytest.fixture(scope="module")
+def frames(clip):
+    def motion(place, t):
+        return MIDDLE + (place - MIDDLE) * (1 - 0.15 * np.sin(np.pi * t / FRAMES) ** 2)
+
+    return clip(motion, FRAMES, SIZE)
+
+
+def found(frames, ring, settings):
+    mask, points = ring
+    return track(frames, points, mask, SPACING, np.arange(FRAMES) * 5e-3, 0, settings)
+
+
+def weights(path, channels, **last_bias):
+    """File of weights that give the same output everywhere: `last_bias`, at the numbers that are its keys."""
+    layers = len(DILATIONS)
+    shapes = {"first": (WIDTH, channels), "first_bias": (WIDTH,), "layers": (layers, WIDTH, WIDTH, 3, 3)}
+    shapes |= {"biases": (layers, WIDTH), "last": (OUTPUTS, WIDTH), "last_bias": (OUTPUTS,)}
+    arrays = {name: np.zeros(shape, np.float32) for name, shape in shapes.items()}
+    arrays["last_bias"][2 * DEPTHS :] = last_bias.get("log_deviation", 0.0)
+    np.savez(path, **arrays)
+    return str(path)
+
+
+def features(frames, ring):
+    mask, points = ring
+    return ray_features(TrackerInput(frames, points, mask, SPACING, np.arange(FRAMES) * 5e-3, 0), BsplineCnn())
+
+
+def test_network_that_adds_nothing_leaves_the_motion_of_bspline_dic(frames, ring, tmp_path):
+    number = len(features(frames, ring)[0].channels)
+    sure, unsure = (
+        found(frames, ring, BsplineCnn(weights=weights(tmp_path / f"{log}.npz", number, log_deviation=log)))
+        for log in (-6.0, 0.0)
+    )
+    plain, _ = found(frames, ring, BsplineDic())
+    np.testing.assert_array_equal(sure[0], plain)
+    assert (sure[1][1:] > 0.99).all() and (unsure[1][1:] < 0.3).all() and (sure[1][0] == 1).all()
+
+
+def test_features_are_of_the_ring_as_it_moves(frames, ring):
+    given, path = features(frames, ring)
+    assert given.channels.shape[1:] == (PHASES, RAYS) and np.isfinite(given.channels).all()
+    assert given.displacement.shape == (FRAMES, DEPTHS, RAYS, 2) and path.displacement.shape == (
+        FRAMES,
+        len(ring[1]),
+        2,
+    )
+    along, across = given.displacement[3, DEPTHS // 2].T
+    assert np.abs(along + 0.15 * 35).max() < 0.3 and np.abs(across).max() < 0.3
+    assert given.scale == pytest.approx(0.15 * 35, rel=0.1)
+
+
+def test_weights_of_the_package_find_a_contraction(frames, ring):
+    moved, quality = found(frames, ring, BsplineCnn())
+    points = ring[1]
+    true = -0.15 * (points - MIDDLE)
+    assert np.sqrt(((moved[3] - true) ** 2).sum() / (true**2).sum()) < 0.15
+    assert (moved[0] == 0).all() and (quality[0] == 1).all() and ((quality >= 0) & (quality <= 1)).all()
+
+
+def test_phases_and_frames_of_a_cycle_are_turned_into_one_another():
+    cycle = np.sin(2 * np.pi * np.arange(48) / 48)[:, None]
+    np.testing.assert_allclose(over_phases(cycle), cycle[::2], atol=1e-12)
+    np.testing.assert_allclose(over_frames(over_phases(cycle), 48), cycle, atol=0.01)
+
+
+def test_wall_without_a_cavity_is_told(frames):
+    with pytest.raises(TrackerFailed, match="surrounds no cavity"):
+        found(frames, (np.ones((SIZE, SIZE), bool), np.array([[60.0, 60.0]])), BsplineCnn())
+
+
+def test_nothing_is_found_without_a_wall(frames):
+    moved, quality = found(frames, (np.zeros((SIZE, SIZE), bool), np.array([[60.0, 60.0]])), BsplineCnn())
+    assert np.isnan(moved).all() and np.isnan(quality).all()
+
+
+def test_file_of_weights_that_is_not_there_is_told(frames, ring):
+    with pytest.raises(TrackerFailed, match=r"nowhere\.npz: holds no weights"):
+        found(frames, ring, BsplineCnn(weights="nowhere.npz"))
