@@ -80,7 +80,7 @@ def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_comput
     import torch
 
     names, found = rays
-    network = names["train"](found, epochs=100)
+    network = names["train"](found, epochs=60)
     names["calibrate"](network, found)
     given = names["batch"](found)
     with torch.no_grad():
