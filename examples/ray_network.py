@@ -134,8 +134,7 @@ def mirrored(given):
 def relative_error(moved, given):
     """RMS error over the RMS motion, of each clip, all phases together."""
     known = given["known"][:, :, None]
-    squares = (((values**2).sum(1) * known).sum((1, 2, 3)) for values in (moved - given["true"], given["true"]))
-    error, motion = squares
+    error, motion = (((each**2).sum(1) * known).sum((1, 2, 3)) for each in (moved - given["true"], given["true"]))
     return torch.sqrt(error / motion.clamp(min=1e-9) + 1e-9)
 
 

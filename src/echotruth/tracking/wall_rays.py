@@ -39,6 +39,11 @@ class WallRays:
     outer: np.ndarray
     crosses: np.ndarray
 
+    @cached_property
+    def thickness(self) -> float:
+        """Mean thickness of the wall along the rays that cross it, px."""
+        return float((self.outer - self.inner)[self.crosses].mean())
+
     @property
     def points(self) -> np.ndarray:
         """Points (DEPTHS, RAYS, 2), px, in the middle of equal parts of each ray."""

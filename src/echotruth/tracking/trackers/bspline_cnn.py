@@ -10,7 +10,6 @@ correction is interpolated linearly.
 from dataclasses import dataclass, fields, replace
 from pathlib import Path as File
 
-import cv2
 import numpy as np
 
 from echotruth.config.tracking import BsplineCnn
@@ -19,7 +18,7 @@ from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import amplitudes, even_gain, rms
 from echotruth.tracking.ray_network import PHASES, read
 from echotruth.tracking.tracker_input import TrackerInput
-from echotruth.tracking.trackers.bspline_dic import BothWays, follow, lost
+from echotruth.tracking.trackers.bspline_dic import BothWays, follow, gaussian, lost
 from echotruth.tracking.wall_rays import ANGLES, DEPTHS, DIRECTIONS, RAYS, WallRays, wall_rays
 
 WEIGHTS = File(__file__).with_suffix(".npz")
@@ -83,7 +82,7 @@ def ray_features(clip: TrackerInput, settings: BsplineCnn) -> tuple[RayFeatures,
     path = ways.path
     displacement = rays.along_and_across(on_rays(path.displacement))
     length = np.sqrt((displacement[:, :, rays.crosses] ** 2).sum(-1).mean((1, 2)).max())
-    scale = max(float(length), LEAST_SCALE * float((rays.outer - rays.inner)[rays.crosses].mean()))
+    scale = max(float(length), LEAST_SCALE * rays.thickness)
     channels = [*_motion(rays, ways, displacement, scale), *_brightness(rays, clip, settings, displacement)]
     channels += _circumstances(rays, ways, path, scale)
     given = np.stack([np.broadcast_to(each, (len(clip.frames), RAYS)) for each in channels], 1) * rays.crosses
@@ -136,7 +135,7 @@ def _brightness(rays: WallRays, clip: TrackerInput, settings: BsplineCnn, displa
     The amplitude has even gain and is over its RMS in the wall.
     """
     values, thickness = settings.si(), rays.outer - rays.inner
-    blur = BLUR * float(thickness[rays.crosses].mean())
+    blur = BLUR * rays.thickness
     start = rays.centre + (rays.inner + SHARES[:, None] * thickness)[..., None] * DIRECTIONS
     nearest = np.clip((SHARES * DEPTHS).astype(int), 0, DEPTHS - 1)
     position = start + rays.in_image(displacement)[:, nearest]
@@ -145,7 +144,7 @@ def _brightness(rays: WallRays, clip: TrackerInput, settings: BsplineCnn, displa
         amplitude = np.nan_to_num(amplitudes(frame[None], values.dynamic_range)[0])
         typical = typical or rms(amplitude[clip.mask]) or 1.0
         even = even_gain(amplitude, values.gain / clip.spacing, typical) if values.gain else amplitude
-        blurred = cv2.GaussianBlur(even, (0, 0), blur, borderType=cv2.BORDER_REFLECT) / typical
+        blurred = gaussian(even, blur) / typical
         inside = np.clip(places.reshape(-1, 2), 0, np.array(clip.shape[::-1]) - 1)
         seen.append(interpolate_field(blurred[..., None], inside).reshape(len(SHARES), RAYS))
     brightness = np.array(seen)
@@ -158,8 +157,7 @@ def _circumstances(rays: WallRays, ways: BothWays, path: Path, scale: float) -> 
     unseen = np.zeros(1) if path.unseen is None else on_rays(path.unseen).mean(1)
     phase = 2 * np.pi * np.arange(frames)[:, None] / frames
     thickness, radius = rays.outer - rays.inner, float((rays.inner + rays.outer)[rays.crosses].mean()) / 2
-    typical = float(thickness[rays.crosses].mean())
     beam = [np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)]
-    sizes = [thickness / radius, rays.inner / radius, np.log([typical / 20]), np.log([scale / typical])]
+    sizes = [thickness / radius, rays.inner / radius, np.log([rays.thickness / 20]), np.log([scale / rays.thickness])]
     both = np.ones(1) * (ways.forward is not ways.backward)
     return [unseen, np.ones(1), *beam, ways.weight[:, None], np.cos(phase), np.sin(phase), *sizes, both]
