@@ -38,6 +38,7 @@ def opened(browser, address):
 def one_page(opened):
     page = opened("?tracker=one&colour=none&frame=0")
     page.evaluate(AS_AT_FIRST)
+    page.wait_for_function("location.search.includes('case=')", timeout=60_000)  # what is shown, no more what was asked
     return page
 
 
