@@ -1,37 +1,37 @@
-"""Whether the quality of trackers is the probability that it states, and the constants that make it so.
+"""Constants that make the quality of trackers the probability that it states.
 
-    python benchmarks/quality.py out/A out/B --fit   # constants of `ERRORS` in src/echotruth/tracking/quality.py
-    python benchmarks/quality.py out/A out/B         # results/quality.md: what the quality is worth on other hearts
+    python benchmarks/quality.py out/learning out/learning_human out/learning_ideal
 
-Clips are tracked anew: as they are, with every second frame (`low rate`), and with noise in place of the image in a
-sector of ten degrees (`noise`), whose points count. The fit is of the hearts whose label `split` is develop, by maximum
-likelihood of whether points are within 1/256 of the side of the image of their true places; every clip counts alike.
-The page is of all other hearts. A condition is the label `condition` of a case.
+Every seventh heart of the repositories counts, of config/learning.yaml, learning_human.yaml and learning_ideal.yaml.
+Their clips are tracked anew: as they are, with every second frame, and, by trackers that find hidden tissue, with noise
+in place of the image in a sector of ten degrees, whose points count. The fit is by maximum likelihood of whether points
+are within 1/256 of the side of the image of their true places; every clip counts alike. What is printed goes to
+`ERRORS` in src/echotruth/tracking/quality.py. The suite (docs/benchmark.md) says how well it holds on others.
 """
 
 import argparse
-from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import astuple, dataclass, fields, replace
-from itertools import product
-from pathlib import Path
+from multiprocessing import get_context
 
 import numpy as np
-import report
 from noise_sector import CENTRE_DEG, shadowed
 from scipy import ndimage
 from scipy.optimize import minimize
+from suite import hearts
 
-from echotruth.cases import Case
-from echotruth.config.tracking import OUTSIDE
-from echotruth.evaluation.clip import read_clips
+import echotruth as et
+from echotruth.evaluation.clip import Clip, read_clips
 from echotruth.evaluation.scoring import read_truth
 from echotruth.repository.reader import Repository
-from echotruth.tracking import accumulation, quality
+from echotruth.tracking import quality
 from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker import tracked_path
 from echotruth.tracking.tracker_input import TrackerInput
 
-RESULTS = Path(__file__).parent / "results" / "quality.md"
+OTHERS = {"ilk": {"method": "ilk"}}
+"""Trackers beside those of the suite. The network of `bspline_cnn` tells its own deviation."""
+EVERY_HEART = 7
 EVERY = 13
 """Every n-th value of a clip is used; neighbours in time and place hardly differ."""
 START, LOWEST, HIGHEST = (0.2, 4.0, 0.2, 0.2, 0.04, 0.1), 1e-3, 50.0
@@ -46,59 +46,52 @@ SURE = 1e-6
 class Sample:
     """What a tracker tells of the points of a clip, and whether they are near their true places."""
 
-    condition: str
-    view: str
-    size: int
     tracker: str
+    clip: tuple[str, int, str]
     terms: quality.Squares
     near: np.ndarray
 
 
-def sample(where: tuple[str, str, int, str], speckle: float, path: accumulation.Path, true: np.ndarray, counts):
-    """Sample of a tracked clip; `where` are the first fields, `true` is the displacement (frame, n, 2), px."""
-    error = np.hypot(*np.moveaxis(path.displacement - true, -1, 0)) / (quality.IMAGE_FRACTION * where[2])
-    chosen = np.isfinite(error) & counts
+def sample(
+    settings, view: str, clip: Clip, true: np.ndarray, way: str, frames: np.ndarray, step: int, counts: np.ndarray
+):
+    """Sample of a clip of true displacement, px, from every or every second of the given frames."""
+    given = TrackerInput(frames[::step], *clip.tracker_arguments[1:4], clip.frame_time[::step], clip.seed)
+    path, side = tracked_path(given, settings), frames.shape[-1]
+    error = np.hypot(*np.moveaxis(path.displacement - true[::step], -1, 0)) / (quality.IMAGE_FRACTION * side)
+    chosen = np.isfinite(error) & counts[::step]
     chosen[0] = False
-    terms = quality.squares(path, speckle, (where[2], where[2]))
+    terms = quality.squares(path, speckle_length(clip.frames[0], clip.mask), (side, side))
     values = (np.broadcast_to(getattr(terms, each.name), error.shape)[chosen][::EVERY] for each in fields(terms))
-    return Sample(*where, quality.Squares(*values), error[chosen][::EVERY] < 1)
+    return Sample(quality.error_name(settings), (view, side, way), quality.Squares(*values), error[chosen][::EVERY] < 1)
 
 
-def samples(folder: str, split: str) -> Iterator[Sample]:
-    """Samples of the clips of a repository whose hearts are in a split, develop or test."""
-    repository = Repository(folder)
-    for name in repository.cases.index:
-        case = repository.case(name)
-        if (case.labels.get("split") == "develop") != (split == "develop"):
-            continue
-        for view in case.config.views:
-            if not repository.problem(name, view, "truth", "bmode"):
-                yield from samples_of_view(repository, case, view)
-
-
-def samples_of_view(repository: Repository, case: Case, view: str) -> Iterator[Sample]:
-    """Samples of the clips of one view of a case, in three conditions."""
-    true, plane = read_truth(repository, case.id, view).displacement, case.config.views[view].plane
-    condition = str(case.labels.get("condition", "plain"))
-    trackers = [tracker for tracker in case.config.tracking.trackers.values() if not isinstance(tracker, OUTSIDE)]
-    for size, clip in read_clips(repository, case.id, view).items():
-        displacement, speckle = true / clip.spacing, speckle_length(clip.frames[0], clip.mask)
-        noisy, inside = shadowed(clip.frames, CENTRE_DEG[plane])
-        place = np.moveaxis(clip.points + displacement, -1, 0)[::-1]
-        hidden = ndimage.map_coordinates(inside, place, order=1, mode="nearest") > 0.5
-        every = np.ones_like(hidden)
-        ways = (condition, clip.frames, 1, every), ("low rate", clip.frames, 2, every), ("noise", noisy, 1, hidden)
-        for tracker, (name, frames, step, counts) in product(trackers, ways):
-            given = frames[::step], *clip.tracker_arguments[1:4], clip.frame_time[::step], clip.seed
-            path = tracked_path(TrackerInput(*given), tracker)
-            where = name, plane, size, quality.error_name(tracker)
-            yield sample(where, speckle, path, displacement[::step], counts[::step])
+def samples(folder: str, case: str) -> list[Sample]:
+    """Samples of the clips of a case."""
+    repository, found = Repository(folder), []
+    config = repository.case(case).config
+    trackers = {name: settings for name, settings in hearts.TRACKERS.items() if name != "bspline_cnn"} | OTHERS
+    trackers["corrected"] = trackers["corrected"] | {"window_mm": config.bmode.field_of_view_mm / 8}
+    config = et.configure(config, tracking={"trackers": trackers})
+    for view in config.views:
+        true = read_truth(repository, case, view).displacement
+        for clip in read_clips(repository, case, view).values():
+            displacement = true / clip.spacing
+            noisy, inside = shadowed(clip.frames, CENTRE_DEG[config.views[view].plane])
+            place = np.moveaxis(clip.points + displacement, -1, 0)[::-1]
+            hidden = ndimage.map_coordinates(inside, place, order=1, mode="nearest") > 0.5
+            every = np.ones_like(hidden)
+            for settings in config.tracking.trackers.values():
+                ways = [("plain", clip.frames, 1, every), ("low rate", clip.frames, 2, every)]
+                ways += [("noise", noisy, 1, hidden)] * (settings.method == "bspline_dic")
+                found += [sample(settings, view, clip, displacement, *way) for way in ways]
+    return [one for one in found if len(one.near)]
 
 
 def fitted(given: list[Sample]) -> quality.ErrorModel:
     """Constants of clips without noise; the last one, `unseen`, of clips in which a tracker finds tissue hidden."""
     hidden = [one for one in given if one.terms.unseen.any()]
-    clear = [one for one in given if one.condition != "noise" and len(one.near)]
+    clear = [one for one in given if one.clip[2] != "noise"]
     model = likeliest(clear, quality.ErrorModel(*START), NAMES)
     return likeliest(hidden, model, NAMES[-1:]) if hidden else replace(model, unseen=0.0)
 
@@ -121,28 +114,24 @@ def likeliest(given: list[Sample], start: quality.ErrorModel, names: tuple[str, 
     return replace(start, **{name: float(f"{value:.3g}") for name, value in kept.items()})
 
 
-def page(given: list[Sample]) -> list[str]:
-    """Clips, and the shares of points that are stated to be near and are, %, by tracker, condition, view and size."""
-    rows = []
-    for key in dict.fromkeys((one.tracker, one.condition, one.view, one.size) for one in given):
-        some = [one for one in given if (one.tracker, one.condition, one.view, one.size) == key and len(one.near)]
-        model = quality.ERRORS[key[0]]
-        stated = np.mean([quality.within(1.0, model.variance(one.terms)).mean() for one in some])
-        rows.append([*key, len(some), f"{100 * stated:.0f}", f"{100 * np.mean([one.near.mean() for one in some]):.0f}"])
-    return report.table(["tracker", "condition", "view", "px", "clips", "stated, %", "right, %"], rows)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("repository", nargs="+", help="folder of a repository")
-    parser.add_argument("--fit", action="store_true", help="fit the constants on the hearts of develop")
-    given = parser.parse_args()
-    found = [one for folder in given.repository for one in samples(folder, "develop" if given.fit else "test")]
-    if not given.fit:
-        RESULTS.write_text("\n".join(["# Is the quality the probability that it states?", "", *page(found), ""]))
-    for name in dict.fromkeys(one.tracker for one in found) if given.fit else ():
-        constants = fitted([one for one in found if one.tracker == name])
-        print(f'    "{name}": ErrorModel({", ".join(map(str, astuple(constants)))}),')
+    cases = [(folder, case) for folder in parser.parse_args().repository for case in Repository(folder).cases.index]
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as processes:
+        jobs = [processes.submit(samples, *case) for case in cases[::EVERY_HEART]]
+        found = []
+        for number, job in enumerate(jobs, 1):
+            found += job.result()
+            print(f"{number} of {len(jobs)} hearts", flush=True)
+    for name in dict.fromkeys(one.tracker for one in found):
+        model = fitted([one for one in found if one.tracker == name])
+        print(f'    "{name}": ErrorModel({", ".join(map(str, astuple(model)))}),')
+        for clip in sorted({one.clip for one in found if one.tracker == name}):
+            some = [one for one in found if (one.tracker, one.clip) == (name, clip)]
+            stated = np.mean([quality.within(1.0, model.variance(one.terms)).mean() for one in some])
+            right = np.mean([one.near.mean() for one in some])
+            print(f"    # {clip}: {100 * stated:.0f} % stated, {100 * right:.0f} % right")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
     pip install 'echotruth[torch]'
     echotruth run config/learning.yaml
     echotruth run config/learning_human.yaml
-    python examples/ray_network.py out/learning out/learning_human -o ray_network.npz
+    echotruth run config/learning_ideal.yaml
+    python examples/ray_network.py out/learning out/learning_human out/learning_ideal -o ray_network.npz
 
 Every clip of every size is tracked, one in four at half its frame rate, and the network learns what is missing to the
 true motion and how far it is still off. Hearts that are held out tell how much better it is and how sure it may be; the
@@ -25,16 +26,15 @@ import echotruth as et
 from echotruth import learning
 from echotruth.tracking.ray_network import DILATIONS, LARGEST_DEVIATION, LEAST_DEVIATION, OUTPUTS, PHASES
 from echotruth.tracking.tracker_input import TrackerInput
-from echotruth.tracking.trackers.bspline_cnn import SHARES, on_rays, over_phases, ray_features
+from echotruth.tracking.trackers.bspline_cnn import CHANNELS, on_rays, over_phases, ray_features
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
 
 WIDTH, BATCH, EPOCHS = 64, 8, 30
 FRACTIONS = {"train": 0.85, "test": 0.15}
-ODD = (6 * DEPTHS + 2 * len(SHARES) + 2, 6 * DEPTHS + 2 * len(SHARES) + 5)
 STRAIN_RAYS, STRAIN_WEIGHT, DEVIATION_WEIGHT = 4, 0.3, 0.1
 """Rays between the ends of the lines whose strain counts, and weights of terms of the loss."""
-MIRRORED_CHANNELS = [*range(DEPTHS, 2 * DEPTHS), *range(3 * DEPTHS, 4 * DEPTHS), *ODD]
-"""Channels that change their sign in a mirror: components across the rays, and those of the direction of the beam."""
+ODD = [number for number, name in enumerate(CHANNELS) if name.startswith(("across", "ray_lateral", "ray_sin2"))]
+"""Channels that change their sign in a mirror."""
 LEARNING_RATE, WEIGHT_DECAY = 1e-3, 0.1
 
 
@@ -125,7 +125,7 @@ def mirrored(given):
     """A batch left to right: the ray at an angle a is then at pi - a, and components across rays change their sign."""
     ray = (RAYS // 2 - torch.arange(RAYS)) % RAYS
     found = {name: values[..., ray] for name, values in given.items()}
-    found["channels"][:, MIRRORED_CHANNELS] *= -1
+    found["channels"][:, ODD] *= -1
     for name in ("tracked", "true", "start"):
         found[name][:, 1] *= -1
     return found
@@ -175,7 +175,7 @@ def surprise(moved, log_deviation, given):
 def train(chosen, epochs=EPOCHS, seed=0):
     """A network trained on samples."""
     torch.manual_seed(seed)
-    random, network = np.random.default_rng(seed), RayNetwork(len(chosen[0].channels))
+    random, network = np.random.default_rng(seed), RayNetwork(len(CHANNELS))
     steps = torch.optim.AdamW(network.parameters(), weight_decay=WEIGHT_DECAY)
     per_epoch = max(1, len(chosen) // BATCH)
     pace = torch.optim.lr_scheduler.OneCycleLR(steps, LEARNING_RATE, total_steps=epochs * per_epoch)

@@ -88,7 +88,7 @@ def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_comput
     after, before = (names["relative_error"](each, given).mean() for each in (moved, given["tracked"]))
     assert after < 0.9 * before and names["ratios"](network, found).shape == (len(found), 2)
     names["write"](network, tmp_path / "weights.npz")
-    correction, deviation = read(tmp_path / "weights.npz")(found[0].channels)
+    correction, deviation = read(tmp_path / "weights.npz", len(names["CHANNELS"]))(found[0].channels)
     with torch.no_grad():
         expected, log_deviation = network(torch.from_numpy(found[0].channels)[None])
     np.testing.assert_allclose(correction.transpose(3, 1, 0, 2), expected[0], atol=0.02)  # weights of half precision
@@ -106,7 +106,7 @@ def test_ray_network_sees_a_mirrored_heart_as_a_heart_whose_motion_is_mirrored(r
         )
     for name, values in names["mirrored"](other).items():
         np.testing.assert_array_equal(values, given[name])
-    cosine = names["ODD"][0]
+    cosine = names["CHANNELS"].index("ray_lateral")
     assert (given["channels"][0, cosine] == other["channels"][0, cosine]).float().mean() > 0.5  # the ray at pi - a
 
 

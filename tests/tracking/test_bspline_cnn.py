@@ -5,7 +5,7 @@ from echotruth.config.tracking import BsplineCnn, BsplineDic
 from echotruth.tracking import TrackerFailed, track
 from echotruth.tracking.ray_network import DILATIONS, OUTPUTS, PHASES
 from echotruth.tracking.tracker_input import TrackerInput
-from echotruth.tracking.trackers.bspline_cnn import over_frames, over_phases, ray_features
+from echotruth.tracking.trackers.bspline_cnn import CHANNELS, over_frames, over_phases, ray_features
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
 
 SIZE, SPACING, FRAMES, WIDTH = 128, 25e-6, 6, 4
@@ -34,10 +34,10 @@ def found(frames, ring, settings):
     return track(frames, points, mask, SPACING, np.arange(FRAMES) * 5e-3, 0, settings)
 
 
-def weights(path, channels, **last_bias):
+def weights(path, **last_bias):
     """File of weights that give the same output everywhere: `last_bias`, at the numbers that are its keys."""
     layers = len(DILATIONS)
-    shapes = {"first": (WIDTH, channels), "first_bias": (WIDTH,), "layers": (layers, WIDTH, WIDTH, 3, 3)}
+    shapes = {"first": (WIDTH, len(CHANNELS)), "first_bias": (WIDTH,), "layers": (layers, WIDTH, WIDTH, 3, 3)}
     shapes |= {"biases": (layers, WIDTH), "last": (OUTPUTS, WIDTH), "last_bias": (OUTPUTS,)}
     arrays = {name: np.zeros(shape, np.float32) for name, shape in shapes.items()}
     arrays["last_bias"][2 * DEPTHS :] = last_bias.get("log_deviation", 0.0)
@@ -51,9 +51,8 @@ def features(frames, ring):
 
 
 def test_network_that_adds_nothing_leaves_the_motion_of_bspline_dic(frames, ring, tmp_path):
-    number = len(features(frames, ring)[0].channels)
     sure, unsure = (
-        found(frames, ring, BsplineCnn(weights=weights(tmp_path / f"{log}.npz", number, log_deviation=log)))
+        found(frames, ring, BsplineCnn(weights=weights(tmp_path / f"{log}.npz", log_deviation=log)))
         for log in (-6.0, 0.0)
     )
     plain, _ = found(frames, ring, BsplineDic())
@@ -63,7 +62,7 @@ def test_network_that_adds_nothing_leaves_the_motion_of_bspline_dic(frames, ring
 
 def test_features_are_of_the_ring_as_it_moves(frames, ring):
     given, path = features(frames, ring)
-    assert given.channels.shape[1:] == (PHASES, RAYS) and np.isfinite(given.channels).all()
+    assert given.channels.shape == (len(CHANNELS), PHASES, RAYS) and np.isfinite(given.channels).all()
     assert given.displacement.shape == (FRAMES, DEPTHS, RAYS, 2) and path.displacement.shape == (
         FRAMES,
         len(ring[1]),
@@ -97,6 +96,19 @@ def test_wall_without_a_cavity_is_told(frames):
 def test_nothing_is_found_without_a_wall(frames):
     moved, quality = found(frames, (np.zeros((SIZE, SIZE), bool), np.array([[60.0, 60.0]])), BsplineCnn())
     assert np.isnan(moved).all() and np.isnan(quality).all()
+
+
+def test_clip_of_floating_point_is_tracked_as_that_of_8_bits(frames, ring):
+    grey = frames.copy()
+    grey[0, 0, :2] = 0, 255
+    whole = grey.astype(np.float32) / 4
+    np.testing.assert_allclose(features(whole, ring)[0].channels, features(grey, ring)[0].channels, atol=1e-3)
+
+
+def test_points_that_are_nowhere_are_lost(frames, ring):
+    mask, points = ring
+    path, _ = found(frames, (mask, np.concatenate([points, [[np.nan, np.nan]]])), BsplineCnn())
+    assert np.isnan(path[1:, -1]).all() and np.isfinite(path[:, :-1]).all()
 
 
 def test_file_of_weights_that_is_not_there_is_told(frames, ring):

@@ -65,7 +65,9 @@ def test_numpy_computes_what_pytorch_does():
 def test_weights_are_read_as_they_were_written(tmp_path):
     file = tmp_path / "weights.npz"
     np.savez(file, **network())
-    np.testing.assert_array_equal(read(file).layers, network()["layers"])
+    np.testing.assert_array_equal(read(file, CHANNELS).layers, network()["layers"])
+    with pytest.raises(ValueError, match=r"weights\.npz: .*first is of shape \(6, 4\), not \(6, 5\)"):
+        read(file, CHANNELS + 1)
 
 
 @pytest.mark.parametrize("content", [None, b"no weights"])
@@ -74,4 +76,4 @@ def test_file_without_weights_is_told(tmp_path, content):
     if content:
         file.write_bytes(content)
     with pytest.raises(ValueError, match="holds no weights"):
-        read(file)
+        read(file, CHANNELS)

@@ -110,14 +110,14 @@ def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.189, 50.0, 0.0, 0.0, 0.552),
-    "phase_correlation": ErrorModel(0.0291, 50.0, 0.341, 0.232, 0.0519),
-    "window_deformation": ErrorModel(0.202, 5.88, 0.182, 0.271, 0.0357),
-    "affine_dic": ErrorModel(0.288, 35.9, 0.227, 0.284, 0.0169),
-    "dis": ErrorModel(0.28, 3.84, 0.21, 0.235, 0.0486),
-    "dis_fine": ErrorModel(0.184, 4.42, 0.153, 0.297, 0.0479),
-    "ilk": ErrorModel(0.18, 11.2, 0.187, 0.305, 0.0536),
-    "bspline_dic": ErrorModel(0.121, 5.72, 0.206, 0.308, 0.0291, 0.17),
+    "phase_correlation_ED": ErrorModel(0.154, 50.0, 0.0, 0.0, 0.321),
+    "phase_correlation": ErrorModel(0.074, 50.0, 0.363, 0.185, 0.0363),
+    "window_deformation": ErrorModel(0.177, 20.4, 0.229, 0.179, 0.0398),
+    "affine_dic": ErrorModel(0.341, 5.81, 0.254, 0.207, 0.0373),
+    "dis": ErrorModel(0.257, 5.25, 0.158, 0.181, 0.0709),
+    "dis_fine": ErrorModel(0.174, 6.54, 0.205, 0.231, 0.0504),
+    "ilk": ErrorModel(0.235, 4.55, 0.234, 0.133, 0.051),
+    "bspline_dic": ErrorModel(0.187, 3.6, 0.269, 0.155, 0.0304, 0.149),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 

@@ -9,6 +9,7 @@ arXiv:1511.07122). PyTorch trains it (examples/ray_network.py), and NumPy comput
 
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -68,8 +69,8 @@ class RayNetwork:
         return correction.transpose(2, 0, 3, 1), deviation.transpose(1, 0, 2)
 
 
-def read(file: str | Path) -> RayNetwork:
-    """Weights from a file of NumPy (.npz), as examples/ray_network.py writes it.
+def read(file: str | Path, channels: int) -> RayNetwork:
+    """Weights for a number of channels from a file of NumPy (.npz), as examples/ray_network.py writes it.
 
     Raises
     ------
@@ -78,11 +79,27 @@ def read(file: str | Path) -> RayNetwork:
     """
     try:
         with np.load(file) as arrays:
-            return RayNetwork(**{name: arrays[name].astype(np.float32) for name in RayNetwork.__annotations__})
-    except (OSError, ValueError, KeyError) as error:
+            network = RayNetwork(**{name: arrays[name].astype(np.float32) for name in RayNetwork.__annotations__})
+        _check(network, channels)
+    except (OSError, ValueError, KeyError, TypeError, BadZipFile) as error:
         raise ValueError(
             f"{file}: holds no weights ({error}): give a file that examples/ray_network.py wrote"
         ) from None
+    return network
+
+
+def _check(network: RayNetwork, channels: int) -> None:
+    width, layers = len(network.first_bias), len(DILATIONS)
+    expected = {
+        "first": (width, channels),
+        "layers": (layers, width, width, 3, 3),
+        "biases": (layers, width),
+        "last": (OUTPUTS, width),
+        "last_bias": (OUTPUTS,),
+    }
+    for name, shape in expected.items():
+        if (found := getattr(network, name).shape) != shape:
+            raise ValueError(f"{name} is of shape {found}, not {shape}")
 
 
 def _mixed(weights: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -15,6 +15,7 @@ ACROSS = np.stack([-np.sin(ANGLES), np.cos(ANGLES)], -1)
 """Unit vectors (RAYS, 2) of the image, lateral and axial, along and across the rays."""
 STEP = 0.25
 """Distance at which a ray looks for the wall, px."""
+NO_CAVITY = "The wall surrounds no cavity: give that of a heart, or take another tracker."
 
 
 @dataclass(frozen=True)
@@ -81,9 +82,10 @@ class WallRays:
         Returns
         -------
         ndarray of shape (n, ...)
+            Of points that are NaN, of the middle of the cavity.
         """
         values = values[:, self._nearest]
-        offset = points - self.centre
+        offset = np.nan_to_num(points - self.centre)
         ray = np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) * RAYS % RAYS
         first = ray.astype(int) % RAYS
         second, between = (first + 1) % RAYS, ray - np.floor(ray)
@@ -121,7 +123,7 @@ def wall_rays(mask: np.ndarray) -> WallRays:
     hull = cv2.fillConvexPoly(np.zeros(mask.shape, np.uint8), cv2.convexHull(np.vstack(contours)), 1)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(hull * ~mask)
     if len(stats) < 2:
-        raise ValueError("The wall surrounds no cavity: give that of a heart, or take another tracker.")
+        raise ValueError(NO_CAVITY)
     centre = centroids[1 + np.argmax(stats[1:, cv2.CC_STAT_AREA])]
     distance = np.arange(0, np.hypot(*mask.shape), STEP)
     pixel = np.round(centre + distance[:, None, None] * DIRECTIONS).astype(int)
@@ -133,6 +135,6 @@ def wall_rays(mask: np.ndarray) -> WallRays:
     outer = distance[len(distance) - 1 - hit[::-1].argmax(0)] + STEP
     known = np.nonzero(crosses)[0]
     if len(known) < 2:
-        raise ValueError("The wall surrounds no cavity: give that of a heart, or take another tracker.")
+        raise ValueError(NO_CAVITY)
     inner, outer = (np.interp(np.arange(RAYS), known, edge[known], period=RAYS) for edge in (inner, outer))
     return WallRays(centre, inner, outer, crosses)

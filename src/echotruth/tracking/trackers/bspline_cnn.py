@@ -15,7 +15,7 @@ import numpy as np
 from echotruth.config.tracking import BsplineCnn
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.flow import interpolate_field
-from echotruth.tracking.grey import amplitudes, even_gain, rms
+from echotruth.tracking.grey import rms
 from echotruth.tracking.ray_network import PHASES, read
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.bspline_dic import BothWays, follow, gaussian, lost
@@ -32,6 +32,20 @@ LARGEST = 3.0
 in black images may be anywhere."""
 LEAST_SCALE = 0.1
 """Scale of a motion at least, over the thickness of the wall."""
+EACH_DEPTH = ("along", "across", "along_apart", "across_apart", "ncc_forward", "ncc_backward")
+EACH_SHARE = ("brightness", "brightening")
+BEAM = ("ray_lateral", "ray_axial", "ray_cos2", "ray_sin2")
+SIZES = ("relative_thickness", "relative_radius", "thickness", "scale")
+CHANNELS = (
+    *(f"{kind}_{depth}" for kind in EACH_DEPTH for depth in range(DEPTHS)),
+    *(f"{kind}_{share}" for kind in EACH_SHARE for share in SHARES),
+    "unseen",
+    *BEAM,
+    *("weight", "phase_cosine", "phase_sine"),
+    *SIZES,
+    "both_ways",
+)
+"""Names of what the network is given."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +54,7 @@ class RayFeatures:
 
     Attributes
     ----------
-    channels : ndarray of shape (channel, PHASES, RAYS), float32
+    channels : ndarray of shape (CHANNELS, PHASES, RAYS), float32
     displacement : ndarray of shape (frame, DEPTHS, RAYS, 2)
         Of `bspline_dic`, along and across the ray, px.
     rays : WallRays
@@ -61,7 +75,7 @@ def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
         return replace(nothing, deviation=nothing.variance)
     features, path = ray_features(clip, settings)
     rays, frames = features.rays, len(clip.frames)
-    correction, deviation = read(settings.weights or WEIGHTS)(features.channels)
+    correction, deviation = read(settings.weights or WEIGHTS, len(CHANNELS))(features.channels)
     values = features.scale * np.concatenate([rays.in_image(correction), deviation[..., None]], -1)
     at_points = rays.interpolate(np.moveaxis(values, 0, 2), clip.points)
     found = over_frames(np.moveaxis(at_points, 1, 0), frames)
@@ -83,7 +97,7 @@ def ray_features(clip: TrackerInput, settings: BsplineCnn) -> tuple[RayFeatures,
     displacement = rays.along_and_across(on_rays(path.displacement))
     length = np.sqrt((displacement[:, :, rays.crosses] ** 2).sum(-1).mean((1, 2)).max())
     scale = max(float(length), LEAST_SCALE * rays.thickness)
-    channels = [*_motion(rays, ways, displacement, scale), *_brightness(rays, clip, settings, displacement)]
+    channels = [*_motion(rays, ways, displacement, scale), *_brightness(rays, ways, clip.mask, displacement)]
     channels += _circumstances(rays, ways, path, scale)
     given = np.stack([np.broadcast_to(each, (len(clip.frames), RAYS)) for each in channels], 1) * rays.crosses
     features = RayFeatures(over_phases(given).swapaxes(0, 1).astype(np.float32), displacement, rays, scale)
@@ -129,25 +143,18 @@ def _motion(rays: WallRays, ways: BothWays, displacement: np.ndarray, scale: flo
     return [values[:, depth, :, kind] for kind in range(values.shape[-1]) for depth in range(DEPTHS)]
 
 
-def _brightness(rays: WallRays, clip: TrackerInput, settings: BsplineCnn, displacement: np.ndarray) -> list[np.ndarray]:
+def _brightness(rays: WallRays, ways: BothWays, mask: np.ndarray, displacement: np.ndarray) -> list[np.ndarray]:
     """Channels (frame, ray): amplitude at end-diastole at each of `SHARES`, and how it has changed since, there.
 
     The amplitude has even gain and is over its RMS in the wall.
     """
-    values, thickness = settings.si(), rays.outer - rays.inner
-    blur = BLUR * rays.thickness
-    start = rays.centre + (rays.inner + SHARES[:, None] * thickness)[..., None] * DIRECTIONS
+    start = rays.centre + (rays.inner + SHARES[:, None] * (rays.outer - rays.inner))[..., None] * DIRECTIONS
     nearest = np.clip((SHARES * DEPTHS).astype(int), 0, DEPTHS - 1)
     position = start + rays.in_image(displacement)[:, nearest]
-    typical, seen = 0.0, []
-    for frame, places in zip(clip.frames, position, strict=True):
-        amplitude = np.nan_to_num(amplitudes(frame[None], values.dynamic_range)[0])
-        typical = typical or rms(amplitude[clip.mask]) or 1.0
-        even = even_gain(amplitude, values.gain / clip.spacing, typical) if values.gain else amplitude
-        blurred = gaussian(even, blur) / typical
-        inside = np.clip(places.reshape(-1, 2), 0, np.array(clip.shape[::-1]) - 1)
-        seen.append(interpolate_field(blurred[..., None], inside).reshape(len(SHARES), RAYS))
-    brightness = np.array(seen)
+    inside = np.clip(position.reshape(len(position), -1, 2), 0, np.array(mask.shape[::-1]) - 1)
+    blurred = (gaussian(image, BLUR * rays.thickness)[..., None] for image in ways.images)
+    seen = [interpolate_field(image, places) for image, places in zip(blurred, inside, strict=True)]
+    brightness = np.reshape(seen, (-1, len(SHARES), RAYS)) / (rms(ways.images[0][mask]) or 1.0)
     return [*brightness[0], *np.moveaxis(brightness - brightness[0], 1, 0)]
 
 
@@ -160,4 +167,4 @@ def _circumstances(rays: WallRays, ways: BothWays, path: Path, scale: float) -> 
     beam = [np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)]
     sizes = [thickness / radius, rays.inner / radius, np.log([rays.thickness / 20]), np.log([scale / rays.thickness])]
     both = np.ones(1) * (ways.forward is not ways.backward)
-    return [unseen, np.ones(1), *beam, ways.weight[:, None], np.cos(phase), np.sin(phase), *sizes, both]
+    return [unseen, *beam, ways.weight[:, None], np.cos(phase), np.sin(phase), *sizes, both]

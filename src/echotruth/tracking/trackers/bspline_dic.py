@@ -155,9 +155,9 @@ def follow(clip: TrackerInput, settings: BsplineDic) -> "BothWays":
         visible = visibility(likeness, mask.shape, knot_spacing / BLOCKS_PER_KNOT, BLOCKS_PER_KNOT)
         in_wall = region.positions[region.inside]
         if 1 - visible.at(in_wall).mean() < LEAST_UNSEEN:
-            return BothWays(region, clip.points, trajectories[0], trajectories[-1])
+            return BothWays(region, clip.points, even, trajectories[0], trajectories[-1])
         trajectories = list(threads.map(replace(tracker, visible=visible).track, orders))
-    return BothWays(region, clip.points, trajectories[0], trajectories[-1], visible)
+    return BothWays(region, clip.points, even, trajectories[0], trajectories[-1], visible)
 
 
 def gaussian(image: np.ndarray, deviation: float) -> np.ndarray:
@@ -321,6 +321,8 @@ class BothWays:
     region : WallRegion
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px.
+    images : sequence of ndarray of shape (axial, lateral)
+        Amplitude of each frame, of even gain and blurred, as the wall was tracked in it.
     forward, backward : WallTrajectory
         The same if it is tracked forwards only.
     visible : Visibility, optional
@@ -329,6 +331,7 @@ class BothWays:
 
     region: WallRegion
     points: np.ndarray
+    images: Sequence[np.ndarray]
     forward: WallTrajectory
     backward: WallTrajectory
     visible: Visibility | None = None
