@@ -29,6 +29,9 @@ ABOUT = ("attempt", "plane", "diagnosis", "ejection_fraction_percent", "failure"
 `failure` why the tracker found nothing, or ""; `is_closed` whether the last frame is followed by the first, and
 `judged_closed` whether the trackers think so."""
 
+ROTATION = ("true_rotation_es_deg", "tracked_rotation_es_deg")
+"""Of the wall about its centroid in a short axis."""
+
 HASHES = ("code", "configuration", "images")
 """Of the code and the configurations of the whole suite, of those of the view with the settings of the tracker, and of
 the images of the clip."""

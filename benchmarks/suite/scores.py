@@ -41,7 +41,7 @@ from echotruth.seeds import generator
 from echotruth.tracking.closure import closure
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
-from .columns import packed_reliability, packed_segments
+from .columns import ROTATION, packed_reliability, packed_segments
 from .hearts import SuiteCase, cases_of, suite_version, usable_heart
 
 Row = dict[str, Any]
@@ -86,7 +86,10 @@ def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
             own = {"tracker": name, "failure": failure, "cpu_s": _cpu_time() - began}
             arrays = {key: values[None] for key, values in scored_estimate(clip, truth, estimate).items()}
             stored = as_stored(case, {"tracking/SIZE": arrays})["tracking/SIZE"]
-            row, segments, steps = clip_rows({key: values[0] for key, values in stored.items()}, points)
+            tracked = {key: values[0] for key, values in stored.items()}
+            row, segments, steps = clip_rows(tracked, points)
+            turned = truth.courses["rotation"][truth.es], tracked["tracked_rotation"][truth.es]
+            row |= dict(zip(ROTATION, np.degrees(turned), strict=True))
             tracking = config.tracking.model_copy(update={"trackers": {name: settings}})
             version = version_of("tracking", config.model_copy(update={"tracking": tracking}), view)
             yield keys | own | {"configuration": version} | row | packed_segments(segments) | packed_reliability(steps)
