@@ -33,8 +33,12 @@ WIDTH, BATCH, EPOCHS = 64, 8, 30
 FRACTIONS = {"train": 0.85, "test": 0.15}
 STRAIN_RAYS, STRAIN_WEIGHT, DEVIATION_WEIGHT = 4, 0.3, 0.1
 """Rays between the ends of the lines whose strain counts, and weights of terms of the loss."""
+SHAKE = 0.2
+"""Standard deviation of the motion as a whole that is added, over the scale of the motion."""
 ODD = [number for number, name in enumerate(CHANNELS) if name.startswith(("across", "ray_lateral", "ray_sin2"))]
 """Channels that change their sign in a mirror."""
+BEAM = [CHANNELS.index(name) for name in ("ray_lateral", "ray_axial")]
+"""Channels that are not both 0 on a ray that crosses the wall."""
 LEARNING_RATE, WEIGHT_DECAY = 1e-3, 0.1
 
 
@@ -131,6 +135,25 @@ def mirrored(given):
     return found
 
 
+def shaken(given):
+    """A batch of hearts that also move as a whole, at random; images follow, so that errors stay as they are.
+
+    They drift, and go and come back, along both axes, and they turn about the middle of the cavity.
+    """
+    phase, ray = 2 * np.pi * torch.arange(PHASES) / PHASES, 2 * np.pi * torch.arange(RAYS) / RAYS
+    courses = torch.stack([phase / (2 * np.pi), (1 - torch.cos(phase)) / 2, torch.sin(phase)])
+    size = SHAKE * torch.randn(len(given["channels"]), 3, len(courses))
+    lateral, axial, turn = (size @ courses)[:, :, None, :, None].unbind(1)  # (batch, 1, PHASES, 1)
+    distance = given["start"][:, 0] / given["start"][:, 0].mean((1, 2), keepdim=True)
+    along = lateral * torch.cos(ray) + axial * torch.sin(ray)
+    across = axial * torch.cos(ray) - lateral * torch.sin(ray) + turn / 2 * distance[:, :, None]
+    more = torch.stack([along.expand_as(across), across], 1)
+    crossed = given["channels"][:, BEAM].abs().sum(1) > 0
+    channels = given["channels"].clone()
+    channels[:, : 2 * DEPTHS] += more.flatten(1, 2) * crossed[:, None]
+    return given | {"channels": channels, "tracked": given["tracked"] + more, "true": given["true"] + more}
+
+
 def relative_error(moved, given):
     """RMS error over the RMS motion, of each clip, all phases together."""
     known = given["known"][:, :, None]
@@ -183,7 +206,7 @@ def train(chosen, epochs=EPOCHS, seed=0):
         order, losses = random.permutation(len(chosen)), []
         for number in range(per_epoch):
             given = batch([chosen[index] for index in order[number * BATCH : (number + 1) * BATCH]])
-            given = mirrored(given) if random.random() < 0.5 else given
+            given = shaken(mirrored(given) if random.random() < 0.5 else given)
             correction, log_deviation = network(given["channels"])
             moved = given["tracked"] + correction
             loss = relative_error(moved, given) + STRAIN_WEIGHT * strain_error(moved, given)

@@ -119,7 +119,7 @@ def read_parts(folder: Path = FOLDER) -> pd.DataFrame:
     first = next(iter(code))
     if other := [name for name in code if code[name] != code[first]]:
         raise ValueError(f"{folder}: {other[0]} was made with other code than {first}: make both with the same")
-    table = pd.concat(found, names=["file"]).reset_index("file")
+    table = pd.concat(found, names=["file"]).copy().reset_index("file")
     again = table[table.duplicated([*CLIP, "tracker"])]
     for file, tracker, case in again[["file", "tracker", "case"]].head(1).to_numpy():
         raise ValueError(f"{folder / file}: the tracker {tracker} is in {case} a second time: remove one of its files")

@@ -110,14 +110,14 @@ def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.154, 50.0, 0.0, 0.0, 0.321),
-    "phase_correlation": ErrorModel(0.074, 50.0, 0.363, 0.185, 0.0363),
-    "window_deformation": ErrorModel(0.177, 20.4, 0.229, 0.179, 0.0398),
-    "affine_dic": ErrorModel(0.341, 5.81, 0.254, 0.207, 0.0373),
-    "dis": ErrorModel(0.257, 5.25, 0.158, 0.181, 0.0709),
-    "dis_fine": ErrorModel(0.174, 6.54, 0.205, 0.231, 0.0504),
+    "phase_correlation_ED": ErrorModel(0.246, 50.0, 0.0, 0.0, 0.514),
+    "phase_correlation": ErrorModel(0.0629, 50.0, 0.309, 0.157, 0.0309),
+    "window_deformation": ErrorModel(0.191, 20.4, 0.247, 0.193, 0.043),
+    "affine_dic": ErrorModel(0.368, 5.81, 0.274, 0.224, 0.0403),
+    "dis": ErrorModel(0.27, 5.25, 0.166, 0.19, 0.0744),
+    "dis_fine": ErrorModel(0.181, 6.54, 0.213, 0.24, 0.0524),
     "ilk": ErrorModel(0.235, 4.55, 0.234, 0.133, 0.051),
-    "bspline_dic": ErrorModel(0.187, 3.6, 0.269, 0.155, 0.0304, 0.149),
+    "bspline_dic": ErrorModel(0.174, 3.6, 0.25, 0.144, 0.0283, 0.139),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 
