@@ -6,9 +6,9 @@
     echotruth run config/learning_ideal.yaml
     python examples/ray_network.py out/learning out/learning_human out/learning_ideal -o ray_network.npz
 
-Every clip of every size is tracked, one in four at half its frame rate, and the network learns what is missing to the
-true motion and how far it is still off. Hearts that are held out tell how much better it is and how sure it may be; the
-weights are of the last step. A configuration takes them by `weights: ray_network.npz`.
+Every clip of every size is tracked, one in four at half its frame rate and one in eight forwards only, and the network
+learns what is missing to the true motion and how far it is still off. Hearts that are held out tell how much better it
+is and how sure it may be; the weights are of the last step. A configuration takes them by `weights: ray_network.npz`.
 """
 
 import argparse
@@ -19,26 +19,28 @@ from pathlib import Path
 from zlib import crc32
 
 import numpy as np
+import pandas as pd
 import torch
+from scipy.stats import gmean
 from torch import nn
 
 import echotruth as et
 from echotruth import learning
+from echotruth.tracking.quality import IMAGE_FRACTION, within
 from echotruth.tracking.ray_network import DILATIONS, LARGEST_DEVIATION, LEAST_DEVIATION, OUTPUTS, PHASES
 from echotruth.tracking.tracker_input import TrackerInput
-from echotruth.tracking.trackers.bspline_cnn import CHANNELS, on_rays, over_phases, ray_features
+from echotruth.tracking.trackers.bspline_cnn import CHANNELS, MIRRORED, ODD, on_rays, over_phases, ray_features
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
 
-WIDTH, BATCH, EPOCHS = 64, 8, 30
+WIDTH, BATCH, EPOCHS, DROPOUT = 64, 8, 60, 0.15
 FRACTIONS = {"train": 0.85, "test": 0.15}
 STRAIN_RAYS, STRAIN_WEIGHT, DEVIATION_WEIGHT = 4, 0.3, 0.1
 """Rays between the ends of the lines whose strain counts, and weights of terms of the loss."""
 SHAKE = 0.2
 """Standard deviation of the motion as a whole that is added, over the scale of the motion."""
-ODD = [number for number, name in enumerate(CHANNELS) if name.startswith(("across", "ray_lateral", "ray_sin2"))]
-"""Channels that change their sign in a mirror."""
-BEAM = [CHANNELS.index(name) for name in ("ray_lateral", "ray_axial")]
+DIRECTION = [CHANNELS.index(name) for name in ("ray_lateral", "ray_axial")]
 """Channels that are not both 0 on a ray that crosses the wall."""
+SCALE = CHANNELS.index("scale")
 LEARNING_RATE, WEIGHT_DECAY = 1e-3, 0.1
 
 
@@ -48,7 +50,10 @@ class Sample:
 
     Attributes
     ----------
-    case, view : str
+    name : str
+        Repository, view and image size.
+    near : float
+        Distance within which the quality counts a point as right, over the scale of the motion.
     channels : ndarray of shape (channel, PHASES, RAYS)
     tracked, true : ndarray of shape (2, DEPTHS, PHASES, RAYS)
         Displacement along and across the rays by `bspline_dic` and the true one, over the scale of the motion.
@@ -58,8 +63,8 @@ class Sample:
         1 where the motion is known, else 0.
     """
 
-    case: str
-    view: str
+    name: str
+    near: float
     channels: np.ndarray
     tracked: np.ndarray
     true: np.ndarray
@@ -70,23 +75,22 @@ class Sample:
 def samples(folder: str, case: str) -> list[Sample]:
     """Samples of all clips of a case."""
     repository = et.Repository(folder)
-    config, heart = repository.case(case).config, repository.heart(case)
-    found = []
+    config, heart, found = repository.case(case).config, repository.heart(case), []
     for view in config.views:
         for size in config.bmode.sizes:
-            clip = repository.clip(case, view, size)
-            step = 2 if crc32(f"{case} {view} {size}".encode()) % 4 == 0 else 1
-            found.append(sample(case, view, heart, clip, step))
-    return found
+            name, lot = f"{Path(folder).name}, {view}, {size} px", crc32(f"{case} {view} {size}".encode()) % 8
+            reference = "previous" if lot == 1 else "bidirectional"
+            found.append(sample(name, heart, repository.clip(case, view, size), 2 if lot in (0, 4) else 1, reference))
+    return [one for one in found if one.known.any()]
 
 
-def sample(case, view, heart, clip, step):
+def sample(name, heart, clip, step, reference):
     """Sample of a clip, of which every frame or every second is used."""
     config = heart.config
     images, mask, times = (clip[each].values for each in ("image", "mask", "time"))
     spacing = config.bmode.si().field_of_view / mask.shape[-1]
     given = TrackerInput(images[::step], np.zeros((0, 2)), mask[0].astype(bool), spacing, times[::step], 0)
-    settings = et.configure(config, tracking={"trackers": {"cnn": {"method": "bspline_cnn"}}})
+    settings = et.configure(config, tracking={"trackers": {"cnn": {"method": "bspline_cnn", "reference": reference}}})
     features, _ = ray_features(given, settings.tracking.trackers["cnn"])
     rays, nodes = features.rays, features.rays.points.reshape(-1, 2)
     true = et.point_tracks(heart, clip, nodes)["pixel"].values[::step] - nodes
@@ -95,7 +99,8 @@ def sample(case, view, heart, clip, step):
     tracked, moved = (over_phases(each).transpose(3, 1, 0, 2) for each in (features.displacement, moved))
     start = np.moveaxis(rays.along_and_across(rays.points - rays.centre), -1, 0)
     arrays = features.channels, *(each / features.scale for each in (tracked, moved, start)), known
-    return Sample(case, view, *(each.astype(np.float32) for each in arrays))
+    near = IMAGE_FRACTION * mask.shape[-1] / features.scale
+    return Sample(name, near, *(each.astype(np.float32) for each in arrays))
 
 
 class RayNetwork(nn.Module):
@@ -113,7 +118,7 @@ class RayNetwork(nn.Module):
         values = self.first(channels)
         for layer, (phases, rays) in zip(self.layers, DILATIONS, strict=True):
             around = nn.functional.pad(values, (rays, rays, phases, phases), mode="circular")
-            values = values + torch.relu(layer(around))
+            values = values + nn.functional.dropout2d(torch.relu(layer(around)), DROPOUT, self.training)
         output = self.last(values)
         correction = output[:, : 2 * DEPTHS].reshape(-1, DEPTHS, 2, PHASES, RAYS).transpose(1, 2)
         return correction - correction[..., :1, :], output[:, 2 * DEPTHS :]
@@ -126,9 +131,8 @@ def batch(chosen):
 
 
 def mirrored(given):
-    """A batch left to right: the ray at an angle a is then at pi - a, and components across rays change their sign."""
-    ray = (RAYS // 2 - torch.arange(RAYS)) % RAYS
-    found = {name: values[..., ray] for name, values in given.items()}
+    """A batch left to right; components across rays change their sign."""
+    found = {name: values[..., MIRRORED] for name, values in given.items()}
     found["channels"][:, ODD] *= -1
     for name in ("tracked", "true", "start"):
         found[name][:, 1] *= -1
@@ -148,10 +152,20 @@ def shaken(given):
     along = lateral * torch.cos(ray) + axial * torch.sin(ray)
     across = axial * torch.cos(ray) - lateral * torch.sin(ray) + turn / 2 * distance[:, :, None]
     more = torch.stack([along.expand_as(across), across], 1)
-    crossed = given["channels"][:, BEAM].abs().sum(1) > 0
-    channels = given["channels"].clone()
-    channels[:, : 2 * DEPTHS] += more.flatten(1, 2) * crossed[:, None]
-    return given | {"channels": channels, "tracked": given["tracked"] + more, "true": given["true"] + more}
+    crossed = given["channels"][:, DIRECTION].abs().sum(1, keepdim=True) > 0
+    found = given | {name: given[name] + more for name in ("tracked", "true")} | {"channels": given["channels"].clone()}
+    found["channels"][:, : 2 * DEPTHS] += more.flatten(1, 2) * crossed
+    larger = largest(found["tracked"], given) / largest(given["tracked"], given)
+    found["channels"][:, SCALE] += torch.log(larger)[:, None, None] * crossed[:, 0]
+    found["channels"][:, : 4 * DEPTHS] /= larger[:, None, None, None]
+    lengths = ("tracked", "true", "start")
+    return found | {name: (found[name].movedim(0, -1) / larger).movedim(-1, 0) for name in lengths}
+
+
+def largest(moved, given):
+    """RMS motion of the phase in which it is largest, of each clip: the scale, but for its unit."""
+    known = given["known"][:, :, None]
+    return torch.sqrt(((moved**2).sum(1) * known).sum((1, 3)) / known.sum((1, 3))).amax(1)
 
 
 def relative_error(moved, given):
@@ -183,16 +197,24 @@ def strain_error(moved, given):
     return torch.sqrt(error / size.clamp(min=1e-4) + 1e-9)
 
 
-def surprise(moved, log_deviation, given):
+def squares(correction, given):
+    """Mean over both axes of the square of what is left of the error, (batch, DEPTHS, PHASES - 1, RAYS); at
+    end-diastole there is none."""
+    return ((given["tracked"] + correction - given["true"]) ** 2).mean(1)[:, :, 1:]
+
+
+def surprise(correction, log_deviation, given):
     """Mean negative log likelihood of the error, Gaussian with the deviation that is stated, of each clip.
 
     It moves the deviation alone: the motion is fitted by its error, which clips of large motion do not outweigh.
     """
-    squares = ((moved.detach() - given["true"]) ** 2).sum(1)
-    known = given["known"][:, :, None].expand_as(squares)
-    log_deviation = log_deviation.clamp(np.log(LEAST_DEVIATION), np.log(LARGEST_DEVIATION))
-    loss = 2 * log_deviation + squares / 2 * torch.exp(-2 * log_deviation)
-    return (loss * known).sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp(min=1)
+    error, log_deviation = squares(correction.detach(), given), bounded(log_deviation)[:, :, 1:]
+    known = given["known"][:, :, None].expand_as(error)
+    return ((2 * log_deviation + error * torch.exp(-2 * log_deviation)) * known).sum((1, 2, 3)) / known.sum((1, 2, 3))
+
+
+def bounded(log_deviation):
+    return log_deviation.clamp(np.log(LEAST_DEVIATION), np.log(LARGEST_DEVIATION))
 
 
 def train(chosen, epochs=EPOCHS, seed=0):
@@ -210,7 +232,7 @@ def train(chosen, epochs=EPOCHS, seed=0):
             correction, log_deviation = network(given["channels"])
             moved = given["tracked"] + correction
             loss = relative_error(moved, given) + STRAIN_WEIGHT * strain_error(moved, given)
-            loss = (loss + DEVIATION_WEIGHT * surprise(moved, log_deviation, given)).mean()
+            loss = (loss + DEVIATION_WEIGHT * surprise(correction, log_deviation, given)).mean()
             steps.zero_grad()
             loss.backward()
             nn.utils.clip_grad_norm_(network.parameters(), 1.0)
@@ -235,33 +257,51 @@ def write(network, path):
     np.savez_compressed(path, **{name: values.detach().numpy().astype(np.float16) for name, values in arrays.items()})
 
 
+def seen_twice(network, given):
+    """Correction and log deviation of one clip as `bspline_cnn` has them: the mean of the clip and of its mirror."""
+    with torch.no_grad():
+        correction, log_deviation = network(given["channels"])
+        other, other_deviation = network(mirrored(given)["channels"])
+    other = other[..., MIRRORED] * torch.tensor([1, -1])[:, None, None, None]
+    deviation = (torch.exp(bounded(log_deviation)) + torch.exp(bounded(other_deviation[..., MIRRORED]))) / 2
+    return (correction + other) / 2, torch.log(deviation)
+
+
 def calibrate(network, held_out):
     """Multiply the deviations by one number, so that those of hearts that are held out are as large as their errors.
 
     A network is surer of the hearts that it was trained on. The number is the geometric mean over the clips.
     """
     logs = []
-    for one in held_out:
-        given = batch([one])
-        with torch.no_grad():
-            correction, log_deviation = network(given["channels"])
-        squares = ((given["tracked"] + correction - given["true"]) ** 2).sum(1) / 2
-        known = given["known"][:, :, None].expand_as(squares) > 0
-        logs.append(torch.log((squares * torch.exp(-2 * log_deviation))[known].mean()).item())
+    for given in map(batch, zip(held_out)):
+        correction, log_deviation = seen_twice(network, given)
+        known = given["known"][:, :, None].expand(-1, -1, PHASES - 1, -1) > 0
+        relative = squares(correction, given) * torch.exp(-2 * log_deviation[:, :, 1:])
+        logs.append(torch.log(relative[known].mean()).item())
     with torch.no_grad():
         network.last.bias[2 * DEPTHS :] += np.mean(logs) / 2
 
 
-def ratios(network, held_out):
-    """Error of the corrected motion over that of `bspline_dic`, and likewise of strain, (sample, 2)."""
-    found = []
+def scores(network, held_out):
+    """Table of clips that are held out.
+
+    Columns are the `name` of the clip, the `error` of `bspline_dic` over the motion, `ratio` and `strain_ratio`, the
+    error and that of strain of the corrected motion over those of `bspline_dic`, and the shares of points that are
+    `stated` to be right and are `right`, all but the name and the ratios in %.
+    """
+    rows = []
     for one in held_out:
         given = batch([one])
-        with torch.no_grad():
-            moved = given["tracked"] + network(given["channels"])[0]
-        measures = (relative_error, strain_error)
-        found.append([(measure(moved, given) / measure(given["tracked"], given)).item() for measure in measures])
-    return np.array(found)
+        correction, log_deviation = seen_twice(network, given)
+        moved, known = given["tracked"] + correction, given["known"][:, :, None].expand(-1, -1, PHASES - 1, -1) > 0
+        before, after = (
+            [measure(each, given).item() for measure in (relative_error, strain_error)]
+            for each in (given["tracked"], moved)
+        )
+        right = (torch.sqrt(2 * squares(correction, given)) < one.near)[known].float().mean().item()
+        stated = within(one.near, torch.exp(2 * log_deviation[:, :, 1:])[known].numpy()).mean()
+        rows.append([one.name, 100 * before[0], after[0] / before[0], after[1] / before[1], 100 * stated, 100 * right])
+    return pd.DataFrame(rows, columns=["name", "error", "ratio", "strain_ratio", "stated", "right"])
 
 
 def all_samples(cases):
@@ -278,19 +318,20 @@ def main():
     parser.add_argument("repository", nargs="+", help="folder of a repository")
     parser.add_argument("-o", "--output", type=Path, default=Path("ray_network.npz"), help="file of the weights")
     given = parser.parse_args()
-    parts = {name: [] for name in FRACTIONS}
-    for folder in given.repository:
-        for name, hearts in learning.split(learning.cases(folder, "status == 'complete'"), FRACTIONS, seed=1).items():
-            parts[name] += [(folder, case) for case in hearts.index]
-    if not all(parts.values()):
-        parser.error(f"{len(parts['train'])} hearts to train on and {len(parts['test'])} held out: make more hearts")
-    chosen, held_out = (list(all_samples(parts[name])) for name in ("train", "test"))
+    if not given.output.absolute().parent.is_dir() or given.output.suffix != ".npz":
+        parser.error(f"{given.output}: give a file .npz in a folder that is there")
+    tables = {folder: learning.cases(folder, "status == 'complete'") for folder in given.repository}
+    try:
+        parts = learning.split(pd.concat(tables), FRACTIONS, seed=1)
+    except ValueError as error:
+        parser.error(str(error))
+    chosen, held_out = (list(all_samples(part.index)) for part in parts.values())
     network = train(chosen)
     calibrate(network, held_out)
     write(network, given.output)
-    for view in dict.fromkeys(one.view for one in held_out):
-        motion, lines = np.exp(np.log(ratios(network, [one for one in held_out if one.view == view])).mean(0))
-        print(f"{view}: error over that of bspline_dic {motion:.2f}, of strain {lines:.2f}")
+    clips = scores(network, held_out).groupby("name", sort=False)
+    table = clips.mean().assign(clips=clips.size(), **clips[["error", "ratio", "strain_ratio"]].agg(gmean))
+    print(table.round(2).to_string())
     print(f"trained on {len(parts['train'])} hearts, {len(parts['test'])} held out: {given.output}")
 
 

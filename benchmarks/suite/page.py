@@ -146,7 +146,7 @@ class Page:
             for strain in ("gls", "gcs"):
                 of = self.at_largest(clips)
                 true, tracked = (by_heart(of, f"{what}_{strain}_percent") for what in ("true", "tracked"))
-                texts = {str(name): _limits(tracked[name], true[name]) for name in tracked}
+                texts = {str(name): _limits(tracked[name].reindex(true.index), true[name]) for name in tracked}
                 found |= {f"{strain.upper()}, {species}": texts} if texts else {}
         return self._table("tracker", found, lambda cells, name: cells.get(name, NONE))
 

@@ -3,9 +3,18 @@ import pytest
 
 from echotruth.config.tracking import BsplineCnn, BsplineDic
 from echotruth.tracking import TrackerFailed, track
-from echotruth.tracking.ray_network import DILATIONS, OUTPUTS, PHASES
+from echotruth.tracking.ray_network import DILATIONS, OUTPUTS, PHASES, read
 from echotruth.tracking.tracker_input import TrackerInput
-from echotruth.tracking.trackers.bspline_cnn import CHANNELS, over_frames, over_phases, ray_features
+from echotruth.tracking.trackers.bspline_cnn import (
+    CHANNELS,
+    MIRRORED,
+    ODD,
+    WEIGHTS,
+    over_frames,
+    over_phases,
+    ray_features,
+    seen_twice,
+)
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
 
 SIZE, SPACING, FRAMES, WIDTH = 128, 25e-6, 6, 4
@@ -91,6 +100,24 @@ def test_phases_and_frames_of_a_cycle_are_turned_into_one_another():
 def test_wall_without_a_cavity_is_told(frames):
     with pytest.raises(TrackerFailed, match="surrounds no cavity"):
         found(frames, (np.ones((SIZE, SIZE), bool), np.array([[60.0, 60.0]])), BsplineCnn())
+
+
+def test_two_frames_are_no_beat(frames, ring):
+    mask, points = ring
+    with pytest.raises(TrackerFailed, match="needs 6 frames or more; the clip has 2"):
+        track(frames[[0, 3]], points, mask, SPACING, np.array([0, 15e-3]), 0, BsplineCnn())
+
+
+def test_mirrored_clip_is_corrected_as_the_clip(frames, ring):
+    network = read(WEIGHTS, len(CHANNELS))
+    given = features(frames, ring)[0].channels
+    other = given[..., MIRRORED]
+    other[ODD] *= -1
+    (correction, deviation), (mirrored, its_deviation) = (
+        [np.mean(pair, 0) for pair in zip(*seen_twice(network, each), strict=True)] for each in (given, other)
+    )
+    np.testing.assert_allclose(mirrored, correction[:, :, MIRRORED] * [1, -1], atol=1e-5)
+    np.testing.assert_allclose(its_deviation, deviation[:, :, MIRRORED], rtol=1e-4)
 
 
 def test_nothing_is_found_without_a_wall(frames):

@@ -51,7 +51,20 @@ def test_rays_that_cross_no_wall_do_not_count():
     np.testing.assert_allclose(rays.interpolate(values, points), 3.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("mask", [np.zeros((32, 32), bool), np.ones((32, 32), bool)])
+def test_what_lies_beside_the_wall_makes_it_no_thicker():
+    column, row = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
+    muscle, speck = (np.hypot(column - x, row - CENTRE[1]) < 3 for x in (CENTRE[0] + 12, CENTRE[0] + 60))
+    rays, plain = wall_rays(ring() | muscle | speck), wall_rays(ring())
+    assert np.abs(rays.inner - plain.inner).max() < 1.5 and np.abs(rays.outer - plain.outer).max() < 1.5
+
+
+def test_dent_outside_is_no_cavity_though_it_is_larger():
+    column, row = np.meshgrid(np.arange(SIZE), np.arange(SIZE))
+    rays = wall_rays(ring(6, 40) & (np.hypot(column - CENTRE[0], row - CENTRE[1] - 45) > 20))
+    assert np.abs(rays.centre - CENTRE).max() < 0.5 and rays.crosses.all()
+
+
+@pytest.mark.parametrize("mask", [np.zeros((32, 32), bool), np.ones((32, 32), bool), ring(-1), ring(opening=2.5)])
 def test_wall_without_cavity_is_told(mask):
     with pytest.raises(ValueError, match=r"wall (is empty|surrounds no cavity)"):
         wall_rays(mask)

@@ -15,7 +15,10 @@ ACROSS = np.stack([-np.sin(ANGLES), np.cos(ANGLES)], -1)
 """Unit vectors (RAYS, 2) of the image, lateral and axial, along and across the rays."""
 STEP = 0.25
 """Distance at which a ray looks for the wall, px."""
-NO_CAVITY = "The wall surrounds no cavity: give that of a heart, or take another tracker."
+LEAST_CAVITY = 0.1
+"""Area of what may be the cavity, over the largest part of the hull that is no wall."""
+LEAST_CROSSING = 0.6
+"""Share of the rays that cross a wall around a cavity; from beside a solid one it is a half."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,9 @@ class WallRays:
 def wall_rays(mask: np.ndarray) -> WallRays:
     """Rays of a wall.
 
-    The cavity is the largest part of the convex hull of the wall that is no wall.
+    The cavity is that part of the convex hull of the wall that is no wall from whose middle most rays cross the wall:
+    a dent outside, which is one too, lies beside it. The wall of a ray is its longest stretch, so that a papillary
+    muscle or a speck elsewhere in the mask makes it no thicker.
 
     Parameters
     ----------
@@ -122,19 +127,34 @@ def wall_rays(mask: np.ndarray) -> WallRays:
         raise ValueError("The wall is empty.")
     hull = cv2.fillConvexPoly(np.zeros(mask.shape, np.uint8), cv2.convexHull(np.vstack(contours)), 1)
     _, _, stats, centroids = cv2.connectedComponentsWithStats(hull * ~mask)
-    if len(stats) < 2:
-        raise ValueError(NO_CAVITY)
-    centre = centroids[1 + np.argmax(stats[1:, cv2.CC_STAT_AREA])]
+    area = stats[1:, cv2.CC_STAT_AREA]
+    large = centroids[1:][area >= LEAST_CAVITY * area.max(initial=0)]
+    found = max((_rays_from(centre, mask) for centre in large), key=lambda rays: rays.crosses.sum(), default=None)
+    if found is None or found.crosses.mean() < LEAST_CROSSING:
+        raise ValueError("The wall surrounds no cavity: give that of a heart, or take another tracker.")
+    return found
+
+
+def _rays_from(centre: np.ndarray, mask: np.ndarray) -> WallRays:
+    """Rays from a point, lateral and axial, px; edges are infinite if none crosses the wall."""
     distance = np.arange(0, np.hypot(*mask.shape), STEP)
     pixel = np.round(centre + distance[:, None, None] * DIRECTIONS).astype(int)
     inside = (pixel >= 0).all(-1) & (pixel < mask.shape[::-1]).all(-1)
     row, column = np.clip(pixel[..., 1], 0, mask.shape[0] - 1), np.clip(pixel[..., 0], 0, mask.shape[1] - 1)
-    hit = mask[row, column] & inside
-    crosses = hit.any(0)
-    inner = distance[hit.argmax(0)]
-    outer = distance[len(distance) - 1 - hit[::-1].argmax(0)] + STEP
+    edges = np.array([_longest(hit) for hit in (mask[row, column] & inside).T])
+    crosses = edges[:, 1] > edges[:, 0]
     known = np.nonzero(crosses)[0]
-    if len(known) < 2:
-        raise ValueError(NO_CAVITY)
-    inner, outer = (np.interp(np.arange(RAYS), known, edge[known], period=RAYS) for edge in (inner, outer))
+    if not len(known):
+        return WallRays(centre, np.full(RAYS, np.inf), np.full(RAYS, np.inf), crosses)
+    inner, outer = (np.interp(np.arange(RAYS), known, edge[known], period=RAYS) for edge in STEP * edges.T)
     return WallRays(centre, inner, outer, crosses)
+
+
+def _longest(hit: np.ndarray) -> tuple[int, int]:
+    """First index of the longest stretch of True, and that after its last; both 0 without any."""
+    change = np.diff(np.concatenate([[False], hit, [False]]).astype(int))
+    starts, ends = np.nonzero(change == 1)[0], np.nonzero(change == -1)[0]
+    if not len(starts):
+        return 0, 0
+    longest = np.argmax(ends - starts)
+    return starts[longest], ends[longest]

@@ -16,7 +16,7 @@ from echotruth.config.tracking import BsplineCnn
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import rms
-from echotruth.tracking.ray_network import PHASES, read
+from echotruth.tracking.ray_network import PHASES, RayNetwork, read
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.bspline_dic import BothWays, follow, gaussian, lost
 from echotruth.tracking.wall_rays import ANGLES, DEPTHS, DIRECTIONS, RAYS, WallRays, wall_rays
@@ -34,18 +34,24 @@ LEAST_SCALE = 0.1
 """Scale of a motion at least, over the thickness of the wall."""
 EACH_DEPTH = ("along", "across", "along_apart", "across_apart", "ncc_forward", "ncc_backward")
 EACH_SHARE = ("brightness", "brightening")
-BEAM = ("ray_lateral", "ray_axial", "ray_cos2", "ray_sin2")
+DIRECTION = ("ray_lateral", "ray_axial", "ray_cos2", "ray_sin2")
 SIZES = ("relative_thickness", "relative_radius", "thickness", "scale")
 CHANNELS = (
     *(f"{kind}_{depth}" for kind in EACH_DEPTH for depth in range(DEPTHS)),
     *(f"{kind}_{share}" for kind in EACH_SHARE for share in SHARES),
     "unseen",
-    *BEAM,
+    *DIRECTION,
     *("weight", "phase_cosine", "phase_sine"),
     *SIZES,
     "both_ways",
 )
 """Names of what the network is given."""
+ODD = [number for number, name in enumerate(CHANNELS) if name.startswith(("across", "ray_lateral", "ray_sin2"))]
+"""Channels that change their sign in a mirror, left to right."""
+MIRRORED = (RAYS // 2 - np.arange(RAYS)) % RAYS
+"""Ray that each is in the mirror: the one at an angle a is at pi - a."""
+LEAST_FRAMES = 6
+"""Frames of a beat at least, of which 24 phases can be told."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,8 @@ class RayFeatures:
 
     Attributes
     ----------
-    channels : ndarray of shape (CHANNELS, PHASES, RAYS), float32
+    channels : ndarray of shape (channel, PHASES, RAYS), float32
+        By :data:`CHANNELS`.
     displacement : ndarray of shape (frame, DEPTHS, RAYS, 2)
         Of `bspline_dic`, along and across the ray, px.
     rays : WallRays
@@ -69,17 +76,36 @@ class RayFeatures:
 
 
 def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
-    """Path of the points of a clip; its deviation is what the network says."""
+    """Path of the points of a clip; its deviation is what the network says.
+
+    Raises
+    ------
+    ValueError
+        If the clip has fewer than `LEAST_FRAMES`, or the wall surrounds no cavity.
+    """
+    frames = len(clip.frames)
+    if frames < LEAST_FRAMES:
+        raise ValueError(
+            f"A network that knows whole beats needs {LEAST_FRAMES} frames or more; the clip has {frames}."
+        )
     if not clip.mask.any():
         nothing = lost(clip)
         return replace(nothing, deviation=nothing.variance)
     features, path = ray_features(clip, settings)
-    rays, frames = features.rays, len(clip.frames)
-    correction, deviation = read(settings.weights or WEIGHTS, len(CHANNELS))(features.channels)
+    rays, network = features.rays, read(settings.weights or WEIGHTS, len(CHANNELS))
+    correction, deviation = (np.mean(both, 0) for both in zip(*seen_twice(network, features.channels), strict=True))
     values = features.scale * np.concatenate([rays.in_image(correction), deviation[..., None]], -1)
     at_points = rays.interpolate(np.moveaxis(values, 0, 2), clip.points)
     found = over_frames(np.moveaxis(at_points, 1, 0), frames)
     return replace(path, displacement=path.displacement + found[..., :2], deviation=found[..., 2])
+
+
+def seen_twice(network: RayNetwork, channels: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Correction and deviation of the network by the channels, and by those of the mirrored clip, mirrored back."""
+    other = channels[..., MIRRORED]
+    other[ODD] *= -1
+    correction, deviation = (values[:, :, MIRRORED] for values in network(other))
+    return [network(channels), (correction * [1, -1], deviation)]
 
 
 def ray_features(clip: TrackerInput, settings: BsplineCnn) -> tuple[RayFeatures, Path]:
@@ -159,12 +185,12 @@ def _brightness(rays: WallRays, ways: BothWays, mask: np.ndarray, displacement: 
 
 
 def _circumstances(rays: WallRays, ways: BothWays, path: Path, scale: float) -> list[np.ndarray]:
-    """Channels that broadcast to (frame, ray): what is seen, direction of the beam, phase, sizes, and the two ways."""
+    """Channels that broadcast to (frame, ray): what is seen, direction of the ray, phase, sizes, and the two ways."""
     frames = len(path.displacement)
     unseen = np.zeros(1) if path.unseen is None else on_rays(path.unseen).mean(1)
     phase = 2 * np.pi * np.arange(frames)[:, None] / frames
     thickness, radius = rays.outer - rays.inner, float((rays.inner + rays.outer)[rays.crosses].mean()) / 2
-    beam = [np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)]
+    direction = [np.cos(ANGLES), np.sin(ANGLES), np.cos(2 * ANGLES), np.sin(2 * ANGLES)]
     sizes = [thickness / radius, rays.inner / radius, np.log([rays.thickness / 20]), np.log([scale / rays.thickness])]
     both = np.ones(1) * (ways.forward is not ways.backward)
-    return [unseen, *beam, ways.weight[:, None], np.cos(phase), np.sin(phase), *sizes, both]
+    return [unseen, *direction, ways.weight[:, None], np.cos(phase), np.sin(phase), *sizes, both]

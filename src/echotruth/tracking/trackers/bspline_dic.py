@@ -149,7 +149,8 @@ def follow(clip: TrackerInput, settings: BsplineDic) -> "BothWays":
         blurred = list(threads.map(partial(gaussian, deviation=coarse_blur), resolved))
         coarse = np.array(coarse) / (np.max(coarse) or 1)
         tracker = WallTracker(region, ncc, pixels, coarse, block, images, blurred, amplitudes, settings)
-        orders = bidirectional.forward_backward(len(clip.frames))[: 2 if settings.reference == "bidirectional" else 1]
+        is_both = settings.reference == "bidirectional" and len(clip.frames) > 2  # of two frames both ways are the same
+        orders = bidirectional.forward_backward(len(clip.frames))[: 1 + is_both]
         trajectories = list(threads.map(tracker.track, orders))
         likeness = [match for trajectory in trajectories for match in trajectory.likeness]
         visible = visibility(likeness, mask.shape, knot_spacing / BLOCKS_PER_KNOT, BLOCKS_PER_KNOT)
