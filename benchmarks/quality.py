@@ -8,8 +8,9 @@ Their clips are tracked anew: as they are, with every second frame, and, by trac
 in place of the image in a sector of ten degrees, whose points count. The fit is by maximum likelihood of whether points
 are within 1/256 of the side of the image of their true places; every clip counts alike. These hearts are drawn further
 from the presets than those that users begin with, so that the constants are then multiplied by one factor of each
-tracker: that at which the realistic clips of the half develop are right as often as stated. The result is `ERRORS` in
-src/echotruth/tracking/quality.py. The half test of the suite (docs/benchmark.md) says how well it holds.
+tracker: that at which the realistic clips of the half develop are right as often as stated, in parts 1 and 2 made with
+the constants as they were. The result is `ERRORS` in src/echotruth/tracking/quality.py; all parts are then made anew.
+The half test of the suite (docs/benchmark.md) says how well it holds.
 """
 
 import argparse
@@ -102,8 +103,8 @@ def fitted(given: list[Sample]) -> quality.ErrorModel:
 
 def likeliest(given: list[Sample], start: quality.ErrorModel, names: tuple[str, ...]) -> quality.ErrorModel:
     """Constants of these names with the greatest likelihood; those that are negligible are 0."""
-    columns = ([getattr(one.terms, each.name) for one in given] for each in fields(quality.Squares))
-    terms, near = quality.Squares(*map(np.concatenate, columns)), np.concatenate([one.near for one in given])
+    values = ([getattr(one.terms, each.name) for one in given] for each in fields(quality.Squares))
+    terms, near = quality.Squares(*map(np.concatenate, values)), np.concatenate([one.near for one in given])
     weight = np.concatenate([np.full(len(one.near), 1 / len(one.near)) for one in given])
 
     def loss(logarithms: np.ndarray) -> float:
@@ -118,7 +119,7 @@ def likeliest(given: list[Sample], start: quality.ErrorModel, names: tuple[str, 
     return replace(start, **{name: float(f"{value:.3g}") for name, value in kept.items()})
 
 
-def factor(clips: pd.DataFrame) -> float:
+def factor_of(clips: pd.DataFrame) -> float:
     """Factor of the deviations of a tracker with which it is right as often as it states, in the mean over clips."""
     steps = columns.reliability(clips).query("count > 0")
     share = 1 / steps.groupby(["case", "view", "size_px"])["count"].transform("sum")
@@ -139,9 +140,13 @@ def main() -> None:
         for name, clips in (
             parts.read_parts().query("split == 'develop' and acoustics == 'realistic'").groupby("tracker")
         ):
-            print(f"{name}: {factor(clips):.2f}")
+            print(f"{name}: {factor_of(clips):.2f}")
         return
-    cases = [(folder, case) for folder in given.repository for case in Repository(folder).cases.index]
+    cases = [
+        (folder, case)
+        for folder in given.repository
+        for case in Repository(folder).cases.query("status == 'complete'").index
+    ]
     with ProcessPoolExecutor(mp_context=get_context("spawn")) as processes:
         jobs = [processes.submit(samples, *case) for case in cases[::EVERY_HEART]]
         found = []

@@ -57,6 +57,8 @@ def errors(repository: et.Repository, every: bool) -> Iterator[Row]:
 def errors_of_suite() -> Iterator[Row]:
     """What was tracked and is true in the half develop of the suite. Hearts that move as a whole show no rotation."""
     table = parts.read_parts().query("split == 'develop' and tracker in @TRACKERS", local_dict={"TRACKERS": TRACKERS})
+    if table.empty:
+        raise SystemExit("there are no parts of the half develop: make parts 1 and 2 of the suite first")
     of_clip = ["tracker", "size_px", "acoustics", "heart", "case", "view"]
     for (*clip, heart, case, view), rows in detection.shown(columns.segments(table)).groupby(of_clip):
         seen = rows[rows["aha"] < APEX_SEGMENT].dropna(subset=["true_es_percent", "tracked_es_percent"])
