@@ -82,12 +82,23 @@ def test_features_are_of_the_ring_as_it_moves(frames, ring):
     assert given.scale == pytest.approx(0.15 * 35, rel=0.1)
 
 
-def test_weights_of_the_package_find_a_contraction_that_is_no_hearts(frames, ring):
-    """A ring that shrinks as a whole: no wall thins as it contracts, and the network takes a part of it for error."""
-    moved, quality = found(frames, ring, BsplineCnn())
-    points = ring[1]
-    true = -0.15 * (points - MIDDLE)
-    assert np.sqrt(((moved[3] - true) ** 2).sum() / (true**2).sum()) < 0.2
+def test_weights_of_the_package_follow_a_wall_that_thickens_as_it_contracts(clip, ring):
+    """An incompressible ring, as the wall of a short axis: each circle goes to one of so much less area.
+
+    It has speckle everywhere, also in its cavity, as no echo has, which the network takes for worse than it is.
+    """
+
+    def motion(place, t):
+        offset = place - MIDDLE
+        less = 200 * np.sin(np.pi * t / 12) ** 2
+        radius = np.linalg.norm(offset, axis=-1, keepdims=True)
+        return MIDDLE + offset * np.sqrt(np.maximum(1 - less / np.maximum(radius, 15) ** 2, 0.05))
+
+    mask, points = ring
+    images = clip(motion, 12, SIZE)
+    moved, quality = track(images, points, mask, SPACING, np.arange(12) * 5e-3, 0, BsplineCnn())
+    true = motion(points, 6) - points
+    assert np.sqrt(((moved[6] - true) ** 2).sum() / (true**2).sum()) < 0.2
     assert (moved[0] == 0).all() and (quality[0] == 1).all() and ((quality >= 0) & (quality <= 1)).all()
 
 
