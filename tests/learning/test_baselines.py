@@ -79,7 +79,7 @@ def rays(repository, hearts):
 @pytest.mark.slow
 def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_computed(rays, tmp_path):
     names, found = rays
-    network = names["train"](found, epochs=60)
+    network = names["train"](found, epochs=200)
     names["calibrate"](network, found)
     scores = names["scores"](network, found)
     assert scores["name"].tolist() == [one.name for one in found] and scores["ratio"].mean() < 0.9
@@ -103,7 +103,8 @@ def test_hearts_that_also_move_as_a_whole_have_the_errors_that_they_had(rays):
     )
     errors = [(each["tracked"] - each["true"]) for each in (other, given)]
     sizes = [names["largest"](error, given) for error in errors]
-    smaller = (other["channels"] - given["channels"])[:, names["SCALE"]].amax((1, 2))
+    change = (other["channels"] - given["channels"])[:, names["SCALE"]]  # 0 on rays that cross no wall
+    smaller = change.sum((1, 2)) / (change != 0).sum((1, 2))
     np.testing.assert_allclose(sizes[0] * smaller.exp(), sizes[1], rtol=1e-3)
     np.testing.assert_allclose(
         names["strain_error"](other["tracked"], other), names["strain_error"](given["tracked"], given), rtol=0.1
