@@ -14,9 +14,8 @@ The half test of the suite (docs/benchmark.md) says how well it holds.
 """
 
 import argparse
-from concurrent.futures import ProcessPoolExecutor
+import os
 from dataclasses import astuple, dataclass, fields, replace
-from multiprocessing import get_context
 
 import numpy as np
 import pandas as pd
@@ -27,6 +26,7 @@ from suite import columns, hearts, parts
 
 import echotruth as et
 from echotruth.evaluation.clip import Clip, read_clips
+from echotruth.evaluation.parallel import in_processes
 from echotruth.evaluation.scoring import read_truth
 from echotruth.repository.reader import Repository
 from echotruth.tracking import quality
@@ -71,8 +71,9 @@ def sample(
     return Sample(quality.error_name(settings), (view, side, way), quality.Squares(*values), error[chosen][::EVERY] < 1)
 
 
-def samples(folder: str, case: str) -> list[Sample]:
-    """Samples of the clips of a case."""
+def samples(place: tuple[str, str]) -> list[Sample]:
+    """Samples of the clips of a case, given with the folder of its repository."""
+    folder, case = place
     repository, found = Repository(folder), []
     config = repository.case(case).config
     trackers = {name: settings for name, settings in hearts.TRACKERS.items() if name != "bspline_cnn"} | OTHERS
@@ -137,22 +138,22 @@ def main() -> None:
     parser.add_argument("repository", nargs="*", help="folder of a repository")
     given = parser.parse_args()
     if not given.repository:
-        for name, clips in (
-            parts.read_parts().query("split == 'develop' and acoustics == 'realistic'").groupby("tracker")
-        ):
-            print(f"{name}: {factor_of(clips):.2f}")
+        develop = parts.read_parts().query("split == 'develop' and acoustics == 'realistic'")
+        if develop.empty:
+            parser.error("there are no parts of the half develop: make parts 1 and 2 of the suite first")
+        methods = {"as_published": "phase_correlation_ED", "corrected": "phase_correlation"}
+        for name, clips in develop.groupby("tracker"):
+            print(f"{methods.get(name, name)}: {factor_of(clips):.2f}")
         return
     cases = [
         (folder, case)
         for folder in given.repository
         for case in Repository(folder).cases.query("status == 'complete'").index
     ]
-    with ProcessPoolExecutor(mp_context=get_context("spawn")) as processes:
-        jobs = [processes.submit(samples, *case) for case in cases[::EVERY_HEART]]
-        found = []
-        for number, job in enumerate(jobs, 1):
-            found += job.result()
-            print(f"{number} of {len(jobs)} hearts", flush=True)
+    chosen, found = cases[::EVERY_HEART], []
+    for number, of_case in enumerate(in_processes(samples, chosen, os.cpu_count() or 1), 1):
+        found += of_case
+        print(f"{number} of {len(chosen)} hearts", flush=True)
     for name in dict.fromkeys(one.tracker for one in found):
         model = fitted([one for one in found if one.tracker == name])
         print(f'    "{name}": ErrorModel({", ".join(map(str, astuple(model)))}),')

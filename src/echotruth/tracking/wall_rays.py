@@ -129,25 +129,28 @@ def wall_rays(mask: np.ndarray) -> WallRays:
     _, _, stats, centroids = cv2.connectedComponentsWithStats(hull * ~mask)
     area = stats[1:, cv2.CC_STAT_AREA]
     large = centroids[1:][area >= LEAST_CAVITY * area.max(initial=0)]
-    found = max((_rays_from(centre, mask) for centre in large), key=lambda rays: rays.crosses.sum(), default=None)
-    if found is None or found.crosses.mean() < LEAST_CROSSING:
+    around = [(centre, _edges(centre, mask)) for centre in large]
+    centre, edges = max(around, key=lambda each: _crosses(each[1]).sum(), default=(None, np.zeros((RAYS, 2))))
+    crosses = _crosses(edges)
+    if centre is None or crosses.mean() < LEAST_CROSSING:
         raise ValueError("The wall surrounds no cavity: give that of a heart, or take another tracker.")
-    return found
+    known = np.nonzero(crosses)[0]
+    inner, outer = (np.interp(np.arange(RAYS), known, edge[known], period=RAYS) for edge in edges.T)
+    return WallRays(centre, inner, outer, crosses)
 
 
-def _rays_from(centre: np.ndarray, mask: np.ndarray) -> WallRays:
-    """Rays from a point, lateral and axial, px; edges are infinite if none crosses the wall."""
+def _crosses(edges: np.ndarray) -> np.ndarray:
+    """Whether each ray crosses the wall."""
+    return edges[:, 1] > edges[:, 0]
+
+
+def _edges(centre: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Distance (RAYS, 2) at which each ray from a point enters and leaves the wall, px; both 0 if it crosses none."""
     distance = np.arange(0, np.hypot(*mask.shape), STEP)
     pixel = np.round(centre + distance[:, None, None] * DIRECTIONS).astype(int)
     inside = (pixel >= 0).all(-1) & (pixel < mask.shape[::-1]).all(-1)
     row, column = np.clip(pixel[..., 1], 0, mask.shape[0] - 1), np.clip(pixel[..., 0], 0, mask.shape[1] - 1)
-    edges = np.array([_longest(hit) for hit in (mask[row, column] & inside).T])
-    crosses = edges[:, 1] > edges[:, 0]
-    known = np.nonzero(crosses)[0]
-    if not len(known):
-        return WallRays(centre, np.full(RAYS, np.inf), np.full(RAYS, np.inf), crosses)
-    inner, outer = (np.interp(np.arange(RAYS), known, edge[known], period=RAYS) for edge in STEP * edges.T)
-    return WallRays(centre, inner, outer, crosses)
+    return STEP * np.array([_longest(hit) for hit in (mask[row, column] & inside).T])
 
 
 def _longest(hit: np.ndarray) -> tuple[int, int]:

@@ -93,19 +93,20 @@ def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
         return replace(nothing, deviation=nothing.variance)
     features, path = ray_features(clip, settings)
     rays, network = features.rays, read(settings.weights or WEIGHTS, len(CHANNELS))
-    correction, deviation = (np.mean(both, 0) for both in zip(*seen_twice(network, features.channels), strict=True))
+    correction, deviation = seen_twice(network, features.channels)
     values = features.scale * np.concatenate([rays.in_image(correction), deviation[..., None]], -1)
     at_points = rays.interpolate(np.moveaxis(values, 0, 2), clip.points)
     found = over_frames(np.moveaxis(at_points, 1, 0), frames)
     return replace(path, displacement=path.displacement + found[..., :2], deviation=found[..., 2])
 
 
-def seen_twice(network: RayNetwork, channels: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Correction and deviation of the network by the channels, and by those of the mirrored clip, mirrored back."""
+def seen_twice(network: RayNetwork, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Correction and deviation: means of those by the channels and of those by the mirrored clip, mirrored back."""
     other = channels[..., MIRRORED]
     other[ODD] *= -1
-    correction, deviation = (values[:, :, MIRRORED] for values in network(other))
-    return [network(channels), (correction * [1, -1], deviation)]
+    (correction, deviation), mirrored = network(channels), network(other)
+    its_correction, its_deviation = (values[:, :, MIRRORED] for values in mirrored)
+    return (correction + its_correction * [1, -1]) / 2, (deviation + its_deviation) / 2
 
 
 def ray_features(clip: TrackerInput, settings: BsplineCnn) -> tuple[RayFeatures, Path]:
