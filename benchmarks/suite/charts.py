@@ -36,6 +36,7 @@ def draw_ratios(path: Path, boards: dict[int, pd.DataFrame]) -> Path:
     """
     order = list(next(iter(boards.values())).index)
     figure, panels = _panels(list(boards), 1.0 + 0.3 * len(order))
+    ends = pd.concat(boards.values())[["low", "ratio", "high"]].to_numpy(float)
     for (size, board), panel in zip(boards.items(), panels, strict=True):
         known = board[board["ratio"].notna()]
         rows = np.array([order.index(name) for name in known.index])
@@ -47,7 +48,6 @@ def draw_ratios(path: Path, boards: dict[int, pd.DataFrame]) -> Path:
         panel.set_title(f"{size} px")
         panel.set_xlabel("error over that of the first")
         panel.grid(axis="y", visible=False)
-        ends = known[["low", "ratio", "high"]].to_numpy(float)
         style.plain_logarithmic(panel, "x", np.append(ends[np.isfinite(ends)], 1.0))
     panels[0].set_yticks(range(len(order)), order)
     panels[0].set_ylim(len(order) - 0.5, -0.5)

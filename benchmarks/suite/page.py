@@ -167,10 +167,10 @@ class Page:
             found |= {f"{what} at {size} px": table[what] for what in ("contrast", "spread")}
         return self._table("tracker", found, lambda values, name: number(values.get(name, np.nan), 2))
 
-    def qualities(self) -> str:
+    def qualities(self, species: str) -> str:
         """Stated and observed share of right points by acoustics, plane and image size, and the calibration error."""
-        mice = self.of(species="mouse").sort_values("size_px", ascending=False, kind="stable")
-        steps = columns.reliability(mice).merge(mice[["case", "view", "plane"]].drop_duplicates())
+        clips = self.of(species=species).sort_values("size_px", ascending=False, kind="stable")
+        steps = columns.reliability(clips).merge(clips[["case", "view", "plane"]].drop_duplicates())
         keys = ["acoustics", "plane", "size_px"]
         found = {
             f"{acoustics}, {plane.replace('_', ' ')}, {size} px": {
