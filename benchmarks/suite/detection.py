@@ -3,8 +3,8 @@
 A segment with a scar in a part of it shortens a little less than the same segment of a healthy heart. The area under
 the ROC curve is the probability that it has the higher strain, equal ones counting half (Mann-Whitney; Hanley & McNeil,
 Radiology 1982; 143:29, doi 10.1148/radiology.143.1.7063747). It needs no threshold of strain. Hearts differ, so that
-true strain does not find all of them either. It is no ceiling: a tracker that smooths draws a segment at the border of a
-scar towards its neighbour in it, whose strain tells more.
+true strain does not find all of them either. It is no ceiling: a tracker that smooths draws a segment at the border of
+a scar towards its neighbour in it, whose strain tells more.
 """
 
 from __future__ import annotations
