@@ -141,9 +141,10 @@ def main() -> None:
         develop = parts.read_parts().query("split == 'develop' and acoustics == 'realistic'")
         if develop.empty:
             parser.error("there are no parts of the half develop: make parts 1 and 2 of the suite first")
-        methods = {"as_published": "phase_correlation_ED", "corrected": "phase_correlation"}
+        trackers = hearts.cases_of(hearts.plan()[0], 1)[0].case.config.tracking.trackers
+        names = {name: quality.error_name(settings) for name, settings in trackers.items()}
         for name, clips in develop.groupby("tracker"):
-            print(f"{methods.get(name, name)}: {factor_of(clips):.2f}")
+            print(f"{names.get(name, name)}: {factor_of(clips):.2f}")
         return
     cases = [
         (folder, case)

@@ -37,6 +37,7 @@ def draw_ratios(path: Path, boards: dict[int, pd.DataFrame]) -> Path:
     order = list(next(iter(boards.values())).index)
     figure, panels = _panels(list(boards), 1.0 + 0.3 * len(order))
     ends = pd.concat(boards.values())[["low", "ratio", "high"]].to_numpy(float)
+    shown = np.append(ends[np.isfinite(ends)], 1.0)
     for (size, board), panel in zip(boards.items(), panels, strict=True):
         known = board[board["ratio"].notna()]
         rows = np.array([order.index(name) for name in known.index])
@@ -48,7 +49,7 @@ def draw_ratios(path: Path, boards: dict[int, pd.DataFrame]) -> Path:
         panel.set_title(f"{size} px")
         panel.set_xlabel("error over that of the first")
         panel.grid(axis="y", visible=False)
-        style.plain_logarithmic(panel, "x", np.append(ends[np.isfinite(ends)], 1.0))
+        style.plain_logarithmic(panel, "x", shown)
     panels[0].set_yticks(range(len(order)), order)
     panels[0].set_ylim(len(order) - 0.5, -0.5)
     return style.save(figure, path, dpi=120)
