@@ -1,6 +1,6 @@
 # make demo, make benchmark and make test set up .venv from requirements.lock first; Python compiles what is imported.
-# make test-all runs the slow tests too. Make test-integration runs the tests that need PyTorch, an S3 server, SLURM, validators of
-# other formats, other simulators or Sphinx, in an environment of their own; make docs builds the site there.
+# make test-all runs the slow tests too, but for the modules of make test-integration: tests that need PyTorch, an S3 server, SLURM,
+# validators of other formats, other simulators or Sphinx, in an environment of their own; make docs builds the site there.
 
 PYTHON ?= $(shell for p in python3.13 python3.12 python3.11 python3 python; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $$p && break; done)
@@ -18,7 +18,8 @@ benchmark: .venv/ready  ## the suite and docs/benchmark.md; takes hours, and goe
 
 # Two workers, and the static checks beside them; the tests of a module stay on one worker, because they share expensive
 # fixtures.
-test: CHOICE := -m "not slow"
+test: CHOICE = -m "not slow"
+test-all: CHOICE = $(INTEGRATION:%=--ignore=%)
 test test-all: .venv/ready
 	$(MAKE) -j 2 static pytest CHOICE='$(CHOICE)'
 
@@ -31,7 +32,7 @@ static:
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 
-# Modules with tests that .venv skips. tests/cluster takes longest, and so comes first; tests/docs/test_site.py builds the site.
+# Modules with tests that need more than .venv. tests/cluster takes longest, and so comes first; tests/docs/test_site.py builds the site.
 INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/sharing tests/repository/test_remote.py \
 	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs/test_site.py
 

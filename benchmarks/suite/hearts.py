@@ -37,8 +37,13 @@ PLAN: dict[tuple[str, str], dict[str, int]] = {
     ("develop", "human"): {"healthy": 1, "infarct": 1, "late_activation": 1, "dilation": 1},
     ("test", "mouse"): {"healthy": 12, "infarct": 16, "late_activation": 7, "hypertrophy": 6, "dilation": 7},
     ("test", "human"): {"healthy": 4, "infarct": 5, "late_activation": 3, "hypertrophy": 2, "dilation": 2},
+    ("calibration", "mouse"): {"healthy": 3, "infarct": 4, "late_activation": 2, "hypertrophy": 1, "dilation": 2},
+    ("calibration", "human"): {"healthy": 3, "infarct": 4, "late_activation": 2, "hypertrophy": 1, "dilation": 2},
 }
-"""Split and species -> number of hearts of each group. The first two share the parts 1 and 2."""
+"""Split and species -> number of hearts of each group."""
+BLOCKS = ([("develop", "mouse"), ("develop", "human")], [("test", "mouse")], [("test", "human")])
+"""What shares parts. Hearts of the split calibration are in none: on them the quality is fitted
+(benchmarks/quality.py)."""
 
 SETTINGS: dict[str, Any] = {
     "geometry": {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2},
@@ -223,9 +228,8 @@ def _scaled(species: str, keys: Keys) -> Keys:
     return {key: round(factor * value, 4) if key.endswith("_mm") else value for key, value in keys.items()}
 
 
-def plan() -> list[dict[str, Any]]:
+def plan(blocks: Iterable[list[tuple[str, str]]] = BLOCKS) -> list[dict[str, Any]]:
     """Hearts, a row each: part, split, species, heart, group, kind and condition."""
-    blocks = [[("develop", "mouse"), ("develop", "human")], [("test", "mouse")], [("test", "human")]]
     rows: list[dict[str, Any]] = []
     for block in blocks:
         of_block = [row for key in block for row in _planned(*key)]
@@ -245,7 +249,8 @@ def _planned(split: str, species: str) -> Iterable[dict[str, Any]]:
     # Each condition is spread over the groups, but not over the same kinds of them.
     spread = sorted(((k + random.random()) / count, name) for name, count in counts.items() for k in range(count))
     conditions = [name for _, name in spread]
-    first = 1 + (sum(PLAN["develop", species].values()) if split == "test" else 0)
+    before = list(PLAN)[: list(PLAN).index((split, species))]
+    first = 1 + sum(sum(PLAN[key].values()) for key in before if key[1] == species)
     for group, count in groups.items():
         for k in range(count):
             heart = f"{species}{first:02d}"

@@ -74,12 +74,10 @@ def heart_rows(heart: Mapping[str, Any], trackers: dict[str, Any] | None = None)
 def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
     """Rows of one view of a case, of every image size and tracker."""
     case, config = one.case, one.case.config
-    moving, plane = before_probe(heart, config, view)
-    truth, labels = ground_truth(moving, plane, config.views[view].plane, config), _labels(config, moving, plane)
+    truth, labels, clips = view_clips(case, heart, view)
     points = clip_truth(config, view, truth, labels)
-    for size, images in imaged(case, moving, plane, view).items():
-        clip = make_clip(case, view, images, labels[size], truth.inside)
-        keys = one.sorts | {"view": view, "size_px": size} | _about(config, heart, view, clip)
+    for clip in clips:
+        keys = one.sorts | {"view": view, "size_px": clip.size} | _about(config, heart, view, clip)
         for name, settings in config.tracking.trackers.items():
             began = _cpu_time()
             estimate, failure = estimated(clip, settings)
@@ -93,6 +91,15 @@ def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
             tracking = config.tracking.model_copy(update={"trackers": {name: settings}})
             version = version_of("tracking", config.model_copy(update={"tracking": tracking}), view)
             yield keys | own | {"configuration": version} | row | packed_segments(segments) | packed_reliability(steps)
+
+
+def view_clips(case: Case, heart: Heart, view: str) -> tuple[Truth, Labels, list[Clip]]:
+    """Truth and labels of a view, and its clip of each size."""
+    config = case.config
+    moving, plane = before_probe(heart, config, view)
+    truth, labels = ground_truth(moving, plane, config.views[view].plane, config), _labels(config, moving, plane)
+    images = imaged(case, moving, plane, view).items()
+    return truth, labels, [make_clip(case, view, frames, labels[size], truth.inside) for size, frames in images]
 
 
 def _cpu_time() -> float:

@@ -127,7 +127,7 @@ def test_without_a_tracker_nothing_is_inferred(folder, tmp_path):
             "endo_deg = .*: should have at least 2 items",
         ),
         ({"inference": {"tracker": "dis"}, "motion": {"kind": "rigid"}}, "motion.kind = rigid has not"),
-        ({"cases": {"inference.tracker": ["dis", "ilk"]}}, "inference.tracker"),
+        ({"cases": {"inference.tracker": ["dis", "bspline_dic"]}}, "inference.tracker"),
     ],
 )
 def test_settings_that_cannot_be_inferred_from_are_refused_in_a_sentence(given, said):

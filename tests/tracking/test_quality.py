@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage, stats
 
-from echotruth.config.tracking import METHODS, OUTSIDE, BsplineCnn, Dis, PhaseCorrelation
+from echotruth.config.tracking import METHODS, OUTSIDE, Dis, PhaseCorrelation
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.quality import ERRORS, ErrorModel, error_model, within
 from echotruth.tracking.speckle import speckle_length
@@ -92,13 +92,22 @@ def test_point_that_is_not_seen_is_as_sure_as_its_displacement_is_small():
     assert model.probability(seen, SPECKLE, (256, 256))[1, 0] == MODEL.probability(seen, SPECKLE, (256, 256))[1, 0]
 
 
+def test_deviation_that_a_tracker_tells_adds_to_its_other_terms():
+    model, silent = replace(MODEL, told=0.5), path(0.1, 0.1)
+    telling = replace(silent, deviation=np.array([[0.0], [0.7]]))
+    expected = MODEL.probability(silent, SPECKLE, (128, 128))[1, 0]
+    spread = [-1 / (2 * np.log1p(-each)) for each in (expected, model.probability(telling, SPECKLE, (128, 128))[1, 0])]
+    assert spread[1] == pytest.approx(spread[0] + (0.5 * 0.7 * 2) ** 2, rel=1e-9)
+    assert model.probability(silent, SPECKLE, (128, 128))[1, 0] == pytest.approx(expected)
+
+
 def test_lost_point_has_no_quality():
     assert np.isnan(MODEL.probability(path(0.1, displacement=(np.nan, np.nan)), SPECKLE, (256, 256))[1, 0])
 
 
 def test_every_method_of_ours_has_a_fitted_distribution():
     for section in METHODS:
-        if section not in (*OUTSIDE, BsplineCnn):  # which tells the deviation of its error itself
+        if section not in OUTSIDE:
             assert error_model(section()) in ERRORS.values()
     assert error_model(PhaseCorrelation(reference="ED")) is not error_model(PhaseCorrelation(reference="previous"))
     assert error_model(Dis(preset="fine")) is not error_model(Dis(preset="fast"))

@@ -16,7 +16,7 @@ VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short
 
 TRACKERS = (
     *("as_published", "corrected", "phase_correlation"),
-    *("window_deformation", "affine_dic", "bspline_dic", "bspline_cnn", "dis", "ilk"),
+    *("window_deformation", "affine_dic", "bspline_dic", "bspline_cnn", "dis"),
 )
 """Trackers of a default configuration and methods, which the help names without importing them."""
 

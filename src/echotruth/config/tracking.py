@@ -149,16 +149,6 @@ class Dis(Section):
     reference: Reference = "bidirectional"
 
 
-class Ilk(Section):
-    """Iterative Lucas-Kanade of scikit-image, unmodified."""
-
-    method: Literal["ilk"] = "ilk"
-    """Name of the method."""
-    radius_px: Annotated[int, Field(ge=1, le=64)] = 7
-    """Radius of the window about a pixel."""
-    reference: Reference = "bidirectional"
-
-
 TRACKER_ARGUMENTS = ("frames", "points", "mask", "spacing", "frame_time", "seed")
 """Names of the arguments of every tracker, in order."""
 
@@ -291,7 +281,6 @@ METHODS: tuple[type[Section], ...] = (
     BsplineDic,
     BsplineCnn,
     Dis,
-    Ilk,
     *OUTSIDE,
 )
 """Sections of all methods of tracking."""

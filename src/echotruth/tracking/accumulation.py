@@ -61,8 +61,7 @@ class Path:
         From 0 to 1: how far the image shows no tissue at the point, which then moves with what is around it. None of a
         tracker that does not tell.
     deviation : ndarray of shape (frame, n), optional
-        Standard deviation of the error along each axis, px, of a tracker that tells it; the quality follows from it
-        alone.
+        Standard deviation of the error along each axis, px, of a tracker that tells it.
     """
 
     displacement: np.ndarray

@@ -8,14 +8,11 @@ import numpy as np
 
 from echotruth.tracking.accumulation import step_variance
 from echotruth.tracking.flow import interpolate_field
-from echotruth.tracking.grey import decompress, even_gain, grey_levels, rms
+from echotruth.tracking.grey import DYNAMIC_RANGE, decompress, even_gain, grey_levels, rms
 from echotruth.tracking.trackers.dis import MIN_IMAGE_SIDE, optical_flow
 
 MAX_SIDE = 128
 """Side of the block means that are compared, px: speckle is still there, and a pair takes milliseconds."""
-DYNAMIC_RANGE = 45.0
-"""Dynamic range by which log compression is undone, dB: grey values of speckle differ too little from one another
-beside the edges of the wall, which look alike in all frames."""
 GAIN_SHARE = 0.05
 """Distance over which the gain is made even, over the side of the image: else the brightest part of the wall decides,
 which may be a scar that hardly moves."""

@@ -4,6 +4,9 @@ from math import log
 
 import numpy as np
 
+DYNAMIC_RANGE = 45.0
+"""Dynamic range by which log compression is undone, dB, where a clip is judged: grey values of speckle differ too
+little from one another beside the edges of the wall, which look alike in all frames."""
 MIN_GAIN_DB = -30.0
 """Gain over a typical one that :func:`even_gain` makes up for at most."""
 PIXELS_PER_DEVIATION = 4

@@ -3,10 +3,8 @@
 import cv2
 import numpy as np
 
-from echotruth.tracking.grey import decompress, even_gain, grey_levels, rms
+from echotruth.tracking.grey import DYNAMIC_RANGE, decompress, even_gain, grey_levels, rms
 
-DYNAMIC_RANGE = 45.0
-"""Dynamic range by which log compression is undone, dB."""
 GAIN_SHARE, MEAN_SHARE = 0.05, 0.02
 """Standard deviations of the Gaussian weights of the local gain, and of the local mean from which speckle is counted,
 over the side of the image: several speckles, and less than the wall."""

@@ -11,7 +11,7 @@ from echotruth.section import Section
 from echotruth.tracking import trackers
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.failure import TrackerFailed
-from echotruth.tracking.quality import error_model, told_probability
+from echotruth.tracking.quality import error_model
 from echotruth.tracking.tracker_input import TrackerInput
 
 
@@ -82,8 +82,6 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         from echotruth.tracking.speckle import speckle_length
 
         path = tracked_path(clip, settings)
-        if path.deviation is not None:
-            return path.displacement, told_probability(path, clip.shape)
         speckle = speckle_length(clip.frames[0], clip.mask)
     return path.displacement, error_model(settings).probability(path, speckle, clip.shape)
 

@@ -21,8 +21,7 @@ from echotruth.imaging.view import Plane
 from echotruth.repository.reader import Repository
 from echotruth.tracking.alignment import interpolate_with_gradient
 from echotruth.tracking.bidirectional import forward_backward
-from echotruth.tracking.closure import DYNAMIC_RANGE
-from echotruth.tracking.grey import decompress, grey_levels
+from echotruth.tracking.grey import DYNAMIC_RANGE, decompress, grey_levels
 
 PARAMETERS = 27
 """Parameters for each component of the smooth motion of the Cramer-Rao bound: sines and cosines up to four waves around
