@@ -6,7 +6,7 @@ The hearts of the split `calibration` are drawn as those of the suite are (bench
 none of its parts, which say how well the quality holds. Their clips are tracked as they are and, by trackers that find
 hidden tissue, with noise in place of the image in a sector of ten degrees, whose points count. The fit is by maximum
 likelihood of whether points are within 1/256 of the side of the image of their true places; every clip counts alike.
-The result is `ERRORS` in src/echotruth/tracking/quality.py. It takes half an hour on two cores.
+The result is `ERRORS` in src/echotruth/tracking/quality.py. It takes 45 minutes on two cores.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from noise_sector import CENTRE_DEG, shadowed
 from scipy import ndimage
 from scipy.optimize import minimize
 from suite import hearts
-from suite.scores import view_clips
+from suite.scores import heart_views, view_clips
 from threadpoolctl import threadpool_limits
 
 from echotruth.evaluation.clip import Clip
@@ -57,21 +57,16 @@ class Sample:
 
 def samples(row: Mapping[str, object]) -> list[Sample]:
     """Samples of the clips of a heart of the plan."""
+    found = []
     with threadpool_limits(1):
-        attempt, solved = hearts.usable_heart(row)
-        found = []
-        for one in hearts.cases_of(row, attempt):
+        for _, one, heart, view in heart_views(row):
             config = one.case.config
-            for view in config.views:
-                truth, _, clips = view_clips(one.case, replace(solved, config=config), view)
-                centre = CENTRE_DEG[config.views[view].plane]
-                for clip in clips:
-                    true = truth.displacement / clip.spacing
-                    found += [
-                        Sample(quality.error_name(settings), (str(row["species"]), view, clip.size, noisy), *values)
-                        for settings in config.tracking.trackers.values()
-                        for noisy, values in _told(clip, true, settings, centre)
-                    ]
+            truth, _, clips = view_clips(one.case, heart, view)
+            for clip in clips:
+                true, sort = truth.displacement / clip.spacing, (str(row["species"]), view, clip.size)
+                for settings in config.tracking.trackers.values():
+                    for noisy, values in _told(clip, true, settings, CENTRE_DEG[config.views[view].plane]):
+                        found.append(Sample(quality.error_name(settings), (*sort, noisy), *values))
     return [one for one in found if len(one.near)]
 
 

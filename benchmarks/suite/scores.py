@@ -61,14 +61,21 @@ def heart_rows(heart: Mapping[str, Any], trackers: dict[str, Any] | None = None)
     """
     # BLAS sums depend on the number of threads, and the bytes must not.
     with threadpool_limits(1):
-        attempt, solved = usable_heart(heart)
-        found = [
-            row
-            for one in cases_of(heart, attempt, trackers)
-            for view in one.case.config.views
-            for row in view_rows(one, replace(solved, config=one.case.config), view)
+        return [
+            row | {"attempt": attempt}
+            for attempt, one, solved, view in heart_views(heart, trackers)
+            for row in view_rows(one, solved, view)
         ]
-    return [row | {"attempt": attempt} for row in found]
+
+
+def heart_views(
+    heart: Mapping[str, Any], trackers: dict[str, Any] | None = None
+) -> Iterator[tuple[int, SuiteCase, Heart, str]]:
+    """Attempt, case, solved heart and name of every view of a heart; the arguments are those of :func:`heart_rows`."""
+    attempt, solved = usable_heart(heart)
+    for one in cases_of(heart, attempt, trackers):
+        for view in one.case.config.views:
+            yield attempt, one, replace(solved, config=one.case.config), view
 
 
 def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
