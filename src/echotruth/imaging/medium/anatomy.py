@@ -120,16 +120,24 @@ class Anatomy:
 
     @cached_property
     def _epicardium(self):
+        """Tree of the samples of the epicardium, and their numbers.
+
+        What facets share is sampled in the first of them alone, so that rounding does not choose between them.
+        """
         from scipy.spatial import cKDTree
 
-        return cKDTree(sampled(self._nodes, self._facets))
+        points = sampled(self._nodes, self._facets)
+        shared = cKDTree(points).query_pairs(1e-6 * self.radius, output_type="ndarray")
+        number = np.setdiff1d(np.arange(len(points)), shared[:, 1])
+        return cKDTree(points[number]), number
 
     def place(self, position: Floats) -> Place:
         """Place of positions (n, 3), m, in the heart frame."""
-        facet, point = np.divmod(self._epicardium.query(position)[1], len(_lattice()))
+        samples, number = self._epicardium
+        facet, point = np.divmod(number[samples.query(position)[1]], len(_lattice()))
         nearest = closest(self._nodes[self._facets[facet]], _lattice()[point], position)
         distance = np.linalg.norm(position - nearest, axis=1)
-        apex = self._epicardium.data[:, 2].min()
+        apex = samples.data[:, 2].min()
         azimuth = np.arctan2(*(nearest - self.base)[:, 1::-1].T) / SEPTUM_HALF_ANGLE
         below = (self.base[2] - nearest[:, 2]) / (RIGHT_LENGTH * (self.base[2] - apex))
         width = np.maximum(1 - azimuth**2, 0) * np.clip(1 - np.maximum(below, 0) ** 3, 0, None)

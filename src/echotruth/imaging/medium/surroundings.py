@@ -200,15 +200,10 @@ class Surroundings(Body):
         """Amplitudes (n,) by frame: blood changes as that in the cavity."""
         scene, sign, blood = self.scene, np.sign(self.amplitude), np.isin(self.tissue, CAVITIES)
         constant = scene.config.realism.blood.si().decorrelation_time
-        flowing = ar1(sign[blood], scene.time, constant, "chambers", scene.random)
-        fading = scene.fading(sign[~blood], self.name)
-
-        def of_frame(frame: int) -> Floats:
-            signs = np.empty_like(sign)
-            signs[~blood], signs[blood] = fading(frame), flowing(frame)
-            return np.abs(self.amplitude) * signs
-
-        return of_frame
+        # Both of all, so that random numbers do not depend on the tissue, which last bits of the motion decide at edges.
+        flowing = ar1(sign, scene.time, constant, "chambers", scene.random)
+        fading = scene.fading(sign, self.name)
+        return lambda frame: np.abs(self.amplitude) * np.where(blood, flowing(frame), fading(frame))
 
     @property
     def _exponents(self) -> Floats:
