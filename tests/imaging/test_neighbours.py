@@ -7,6 +7,7 @@ import pytest
 from scenes import medium, scene
 
 from echotruth.config import Config
+from echotruth.config.loading import override
 from echotruth.fem.location import locate
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import Anatomy
@@ -123,6 +124,20 @@ def test_neighbours_leave_the_wall_and_its_bytes_as_they_are(heart):
     for bare, full, same in zip(alone, together, again, strict=True):
         assert full[: len(bare)].tobytes() == bare.tobytes()
         assert full.tobytes() == same.tobytes() and len(full) > len(bare)
+
+
+def test_last_bits_of_the_motion_change_neither_tissues_nor_random_numbers(heart):
+    """Neither by which of two facets is nearest, nor by how many scatterers are blood."""
+    config = override(CONFIG, {"realism.decorrelation.time_ms": 10.0})
+    bits = 1 + 1e-12 * np.random.default_rng(8).standard_normal((*heart.displacement.shape[:2], 1))
+    nearly = replace(heart, displacement=heart.positions(0) * (bits - 1) + bits * heart.displacement)
+    around, other = (Surroundings.seed(scene(config, one)) for one in (heart, nearly))
+    np.testing.assert_array_equal(around.tissue, other.tissue)
+    np.testing.assert_allclose(around(3)[1], other(3)[1], rtol=1e-6)
+
+    some = np.arange(len(around.tissue)) < 5
+    bloody = replace(around, tissue=np.where(some, TissueLabel.RIGHT_VENTRICLE, around.tissue))
+    np.testing.assert_array_equal(around._amplitudes(3)[~some], bloody._amplitudes(3)[~some])
 
 
 def test_the_free_wall_moves_inwards_and_the_chest_wall_stays(heart):

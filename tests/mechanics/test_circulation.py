@@ -1,12 +1,13 @@
 """Hearts in a circulation: the healthy one gives its loop back, and changed ones change as in life."""
 
 import warnings
+from functools import cache
 
 import numpy as np
 import pytest
 
 from echotruth.config import Config
-from echotruth.config.diagnosis import BOUNDS_OF, bounds_of
+from echotruth.config.diagnosis import BOUNDS_OF, bounds_of, diagnosis
 from echotruth.heart import Heart
 from echotruth.loop.calibration import calibrate
 from echotruth.loop.cycle import read_loop
@@ -34,6 +35,25 @@ def heart(frames=12, geometry=None, pathology=None, **factors):
 def measured(config):
     arrays = beat(config)
     return arrays["mechanics"], measured_heart(arrays, config)[0]
+
+
+SEGMENTS = [7, 8, 12, 13, 14]
+DISEASES = {
+    "healthy": {},
+    **{age: {"pathology": {"infarct": {"segments": SEGMENTS, "age": age}}} for age in ("fresh", "old")},
+    "lbbb": {"pathology": {"activation": {"preset": "lbbb"}}},
+    "dcm": {"pathology": {"preset": "dcm"}},
+    "hypertension": {"pathology": {"preset": "hypertension"}},
+    "weak": {"contractility": 0.7},
+}
+
+
+@cache
+def diseased(disease, species):
+    """Configuration, arrays, measures and judged values of a heart."""
+    config = heart(24, BLOCKED | {"preset": species}, **DISEASES[disease])
+    arrays = beat(config)
+    return config, arrays, *measured_heart(arrays, config)
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +106,7 @@ def test_changed_hearts_change_as_in_life(healthy):
     assert full["volume"][0] > 1.1 * curves["volume"][0]
     assert np.ptp(full["volume"]) > 1.05 * np.ptp(curves["volume"])
 
-    scarred, found = measured(heart(pathology={"infarct": {"segments": [7, 8, 12, 13, 14]}}))
+    scarred, found = measured(heart(pathology={"infarct": {"segments": SEGMENTS}}))
     assert found["ejection_fraction"] < fraction - 0.1
     assert scarred["volume"][0] > curves["volume"][0]
     assert scarred["pressure"][0] > 1.5 * curves["pressure"][0]
@@ -94,13 +114,30 @@ def test_changed_hearts_change_as_in_life(healthy):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("species", "disease"),
+    [
+        *((species, disease) for species in ("mouse", "human") for disease in DISEASES),
+        ("rat", "healthy"),
+        ("rat", "dcm"),
+    ],
+)
+def test_heart_is_within_the_bounds_of_its_diagnosis(species, disease):
+    config, _, _, values = diseased(disease, species)
+    assert violation(values, bounds_of(config)) == ""
+    # What is healthy, weak by a little, or compensated may be that of a healthy heart; the others are not.
+    severe = diagnosis(config) in ("fresh", "old", "late", "dcm")
+    assert bool(violation(values, config.physiology)) or not severe
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("species", ["mouse", "human"])
 def test_grown_hearts_are_those_of_their_disease(species):
     """Concentric growth: end-systolic pressure and wall rise, EF is kept, GLS falls. Eccentric growth: wide, weak and
     congested, with what moves before ejection small."""
-    presets = [None, "hypertension", "dcm"]
-    hearts = [heart(24, {"preset": species}, {"preset": preset}) for preset in presets]
-    (before, sound), (pressed, thick), (dilated, wide) = map(measured, hearts)
+    hearts = [diseased(disease, species) for disease in ("healthy", "hypertension", "dcm")]
+    before, pressed, dilated = (arrays["mechanics"] for _, arrays, _, _ in hearts)
+    sound, thick, wide = (found for _, _, found, _ in hearts)
     es = [one["pressure"][int(one["es_frame"])] for one in (before, pressed)]
     assert 1.2 < es[1] / es[0] < 1.45
     assert abs(thick["ejection_fraction"] - sound["ejection_fraction"]) < 0.05
@@ -113,14 +150,12 @@ def test_grown_hearts_are_those_of_their_disease(species):
 
 
 @pytest.mark.slow
-def test_late_wall_stretches_the_septum_again(healthy):
+def test_late_wall_stretches_the_septum_again():
     """Left bundle branch block: the septum shortens at once and stretches the lateral wall, which overtakes it then and
     stretches it in turn; the heart ejects less and twists less."""
-    config = heart(frames=40, geometry=BLOCKED, pathology={"activation": {"preset": "lbbb"}})
-    arrays = beat(config)
-    curves, found = arrays["mechanics"], measured_heart(arrays, config)[0]
-    normal = measured(heart(frames=40, geometry=BLOCKED))[1]
-    es = int(curves["es_frame"])
+    config, arrays, found, _ = diseased("lbbb", "mouse")
+    normal = diseased("healthy", "mouse")[2]
+    es = int(arrays["mechanics"]["es_frame"])
     strain = centroid_kinematics(Heart.of(arrays, config))["strain"][..., 1]
     segment = arrays["fibres"]["segment"]
     septal, lateral = (strain[:, np.isin(segment, w)].mean(axis=1) for w in ((2, 3, 8, 9, 14), (5, 6, 11, 12, 16)))
@@ -136,10 +171,8 @@ def test_late_wall_stretches_the_septum_again(healthy):
 @pytest.mark.parametrize("age", ["fresh", "old"])
 def test_infarct_hardly_bulges_and_the_wall_away_from_it_shortens_less(age):
     """As in mice after a day (Epstein 2002), whose ejection fraction falls and whose remote wall weakens."""
-    normal = beat(heart(frames=24, geometry=BLOCKED))
-    infarct = {"segments": [7, 8, 12, 13, 14], "age": age}
-    config = heart(frames=24, geometry=BLOCKED, pathology={"infarct": infarct})
-    arrays = beat(config)
+    _, normal, _, _ = diseased("healthy", "mouse")
+    _, arrays, _, _ = diseased(age, "mouse")
     curves, region = arrays["mechanics"], arrays["pathology"]["region"]
     es, ivc = int(curves["es_frame"]), np.flatnonzero(curves["phase"] == CONTRACTION)[-1]
     strain = arrays["kinematics"]["strain"][..., 1].astype(float)
