@@ -200,7 +200,7 @@ class Surroundings(Body):
         """Amplitudes (n,) by frame: blood changes as that in the cavity."""
         scene, sign, blood = self.scene, np.sign(self.amplitude), np.isin(self.tissue, CAVITIES)
         constant = scene.config.realism.blood.si().decorrelation_time
-        # Both of all, so that random numbers do not depend on the tissue, which last bits of the motion decide at edges.
+        # Both of all, so that random numbers do not depend on the tissue, which last bits decide at edges.
         flowing = ar1(sign, scene.time, constant, "chambers", scene.random)
         fading = scene.fading(sign, self.name)
         return lambda frame: np.abs(self.amplitude) * np.where(blood, flowing(frame), fading(frame))
