@@ -33,7 +33,7 @@ PLAN = [[("calibration", "mouse"), ("calibration", "human")]]
 FIND_HIDDEN = ("bspline_dic", "bspline_cnn")
 EVERY = 13
 """Every n-th value of a clip is used; neighbours in time and place hardly differ."""
-START = quality.ErrorModel(0.2, 4.0, 0.2, 0.2, 0.04, 0.1, 0.5)
+START = quality.ErrorModel(0.2, 1.0, 0.2, 0.2, 0.04, 0.1, 0.5)
 LOWEST, HIGHEST = 1e-3, 50.0
 """Constants at which the fit starts, and their bounds."""
 NAMES = tuple(each.name for each in fields(quality.ErrorModel))

@@ -11,7 +11,7 @@ from echotruth.tracking.accumulation import Path
 from echotruth.tracking.quality import ERRORS, ErrorModel, error_model, within
 from echotruth.tracking.speckle import speckle_length
 
-MODEL = ErrorModel(speckle=0.3, limit=2.0, disagreement=0.6, wall=0.2, motion=0.05)
+MODEL = ErrorModel(speckle=0.3, prior=0.9, disagreement=0.6, wall=0.2, motion=0.05)
 SPECKLE = 1.5
 
 
@@ -32,7 +32,8 @@ def test_points_with_the_stated_probability_are_within_the_distance_that_often()
     """A million errors in an image of 64 x 128 px, where 1/256 of the side is half a pixel."""
     random, count = np.random.default_rng(1), 1_000_000
     side = 256 / 128
-    squared = (0.3 * SPECKLE * side) ** 2 / (1 / 0.4 + 1 / 2) + (0.6**2 + 0.2**2) * (side * 0.2) ** 2
+    noise = 0.4 * (0.3 * SPECKLE * side) ** 2
+    squared = 1 / (1 / noise + 1 / 0.9**2) + (0.6**2 + 0.2**2) * (side * 0.2) ** 2
     error = np.sqrt(squared + (0.05 * side * 5) ** 2) * random.standard_normal((2, count))
     quality = MODEL.probability(path(0.4, 0.2), SPECKLE, (64, 128))[1, 0]
     assert abs(np.mean(np.hypot(*error) < 1) - quality) < 4 * np.sqrt(quality * (1 - quality) / count)

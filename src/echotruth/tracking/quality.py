@@ -27,24 +27,23 @@ class ErrorModel:
     (:mod:`echotruth.tracking.speckle`), the variance V of :class:`echotruth.tracking.accumulation.Path`, the tracked
     displacement u and the disagreement d, which is u at most, is
 
-        s^2 = (speckle l)^2 V / (1 + V / limit) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2
-              + (told S)^2,
+        s^2 = N prior^2 / (N + prior^2) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2 + (told S)^2,
 
-    where D is the RMS of d over the points in the frame, q, from 0 to 1, how far the point is not seen in the image,
-    and S the deviation that the tracker itself tells, if it does. V l^2 is the variance of the places of speckle. It
-    counts in full where images are alike. Where they are not, the tracker relies on what it expects of the motion, as a
-    smooth one: with that as prior the variance is the noise's times the prior's over their sum. The two ways err
-    together at many a point, but not at all of them, so that D tells more than d. Two ways that are farther apart than
-    the point has moved do not say that it is farther off.
+    where N = (speckle l)^2 V, D is the RMS of d over the points in the frame, q, from 0 to 1, how far the point is not
+    seen in the image, and S the deviation that the tracker itself tells, if it does. V l^2 is the variance of the
+    places of speckle. It counts in full where images are alike. Where they are not, the tracker relies on what it
+    expects of the motion, as a smooth one: with a prior the variance is the noise's times the prior's over their sum.
+    The two ways err together at many a point, but not at all of them, so that D tells more than d. Two ways that are
+    farther apart than the point has moved do not say that it is farther off.
 
     Attributes
     ----------
-    speckle, limit, disagreement, wall, motion, unseen, told : float
+    speckle, prior, disagreement, wall, motion, unseen, told : float
         See above.
     """
 
     speckle: float
-    limit: float
+    prior: float
     disagreement: float
     wall: float
     motion: float
@@ -74,9 +73,8 @@ class ErrorModel:
 
     def variance(self, terms: "Squares") -> np.ndarray:
         """s^2 of points, in squares of 1/256 of the longer side of the image; the shape is that of the terms."""
-        v = terms.variance
-        noise = np.divide(v, 1 + v / self.limit, out=np.full_like(v, self.limit), where=np.isfinite(v))
-        expected = self.speckle**2 * terms.speckle * noise
+        prior = self.prior**2
+        expected = prior * (1 - prior / (self.speckle**2 * terms.speckle * terms.variance + prior))
         expected += self.disagreement**2 * terms.disagreement + self.wall**2 * terms.wall
         expected += self.told**2 * terms.told
         return expected + (self.motion**2 + self.unseen**2 * terms.unseen) * terms.motion
@@ -121,14 +119,14 @@ def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.238, 39.3, 0.0, 0.0, 0.343, 0.0, 0.0),
-    "phase_correlation": ErrorModel(0.0388, 50.0, 0.31, 0.298, 0.0566, 0.0, 0.0),
-    "window_deformation": ErrorModel(0.227, 7.02, 0.205, 0.259, 0.0398, 0.0, 0.0),
-    "affine_dic": ErrorModel(1.07, 0.0711, 0.217, 0.249, 0.049, 0.0, 0.0),
-    "dis": ErrorModel(0.375, 1.16, 0.175, 0.207, 0.0905, 0.0, 0.0),
-    "dis_fine": ErrorModel(0.328, 0.744, 0.209, 0.244, 0.0646, 0.0, 0.0),
-    "bspline_dic": ErrorModel(0.164, 2.43, 0.261, 0.285, 0.0331, 0.196, 0.0),
-    "bspline_cnn": ErrorModel(0.0635, 1.7, 0.151, 0.192, 0.0, 0.113, 0.913),
+    "phase_correlation_ED": ErrorModel(0.254, 2.65, 0.0, 0.0, 0.351, 0.0, 0.0),
+    "phase_correlation": ErrorModel(0.0186, 50.0, 0.314, 0.314, 0.0463, 0.0, 0.0),
+    "window_deformation": ErrorModel(0.236, 1.26, 0.204, 0.256, 0.0389, 0.0, 0.0),
+    "affine_dic": ErrorModel(1.19, 0.572, 0.22, 0.26, 0.0484, 0.0, 0.0),
+    "dis": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
+    "dis_fine": ErrorModel(0.335, 0.675, 0.207, 0.229, 0.0663, 0.0, 0.0),
+    "bspline_dic": ErrorModel(0.172, 0.559, 0.259, 0.284, 0.0321, 0.196, 0.0),
+    "bspline_cnn": ErrorModel(0.0798, 0.202, 0.15, 0.19, 0.0, 0.113, 0.903),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
 
