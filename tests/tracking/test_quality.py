@@ -61,7 +61,7 @@ def test_point_is_less_sure_where_the_ways_of_others_differ():
 
 
 def test_where_images_are_not_alike_the_prior_limits_the_error():
-    limit = (0.3 * SPECKLE) ** 2 * 2 + (0.05 * 5) ** 2
+    limit = 0.9**2 + (0.05 * 5) ** 2
     lost = MODEL.probability(path(np.inf), SPECKLE, (256, 256))[1, 0]
     assert lost == pytest.approx(within(1.0, np.array(limit)))
     assert MODEL.probability(path(1e6), SPECKLE, (256, 256))[1, 0] == pytest.approx(lost, rel=1e-5)
