@@ -15,6 +15,7 @@ import learning_repository
 import numpy as np
 import pytest
 import shown_repository
+from reported_repository import report
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Mesh
@@ -100,6 +101,13 @@ def known(tmp_path_factory) -> known_repository.Known:
 def shown(tmp_path_factory) -> shown_repository.Shown:
     """A ring that moves by whole pixels, as the viewer and the report show it."""
     return shown_repository.shown_at(once(tmp_path_factory, "shown", shown_repository.make_shown))
+
+
+@pytest.fixture(scope="session")
+def reported(shown, tmp_path_factory) -> shown_repository.Shown:
+    """The repository `shown` with its report."""
+    folder = once(tmp_path_factory, "reported", lambda to: report(shutil.copytree(shown.folder, to / "known")))
+    return replace(shown, folder=folder / "known")
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

@@ -1,21 +1,7 @@
-"""A repository with its figures and its page."""
-
-from dataclasses import replace
-from pathlib import Path
-from shutil import copytree
+"""The page of a repository."""
 
 import pytest
 from known_repository import SIZES
-from reported_repository import report
-from shown_repository import Shown
-
-
-@pytest.fixture(scope="session")
-def reported(shown, tmp_path_factory) -> Shown:
-    """The repository `shown` with its report."""
-    folder = Path(copytree(shown.folder, tmp_path_factory.mktemp("reported") / "known"))
-    report(folder)
-    return replace(shown, folder=folder)
 
 
 @pytest.fixture(scope="session")

@@ -174,8 +174,10 @@ GEOMETRY = """() => {
 }"""
 
 
-@pytest.mark.parametrize("query", ["", "&colour=segment", "&colour=strain&other=truth"])
-@pytest.mark.parametrize(("width", "least"), [(390, 120), (1280, 380), (1920, 440)])
+@pytest.mark.parametrize(
+    ("width", "least", "query"),
+    [(390, 120, ""), (1280, 380, "&colour=strain&other=truth"), (1920, 440, "&colour=segment")],
+)
 def test_pictures_are_square_and_fill_the_window_with_the_graphs(opened, width, least, query):
     page = opened(f"?tracker=one&frame=0{query}", width)
     page.wait_for_timeout(1500)
