@@ -15,7 +15,6 @@ import learning_repository
 import numpy as np
 import pytest
 import shown_repository
-from reported_repository import report
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Mesh
@@ -106,6 +105,8 @@ def shown(tmp_path_factory) -> shown_repository.Shown:
 @pytest.fixture(scope="session")
 def reported(shown, tmp_path_factory) -> shown_repository.Shown:
     """The repository `shown` with its report."""
+    from reported_repository import report  # loads what draws, and few tests need it
+
     folder = once(tmp_path_factory, "reported", lambda to: report(shutil.copytree(shown.folder, to / "known")))
     return replace(shown, folder=folder / "known")
 
