@@ -32,12 +32,12 @@ static:
 	$(BIN)/lint-imports
 	$(BIN)/mypy
 
-# Modules with tests that need more than .venv. tests/cluster takes longest, and so comes first; tests/docs/test_site.py builds the site.
+# Modules with tests that need more than .venv; tests/docs/test_site.py builds the site.
 INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/sharing tests/repository/test_remote.py \
 	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs/test_site.py
 
 test-integration: .venv-integration/ready
-	.venv-integration/bin/python -m pytest -n 2 --dist loadscope $(INTEGRATION)
+	.venv-integration/bin/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(INTEGRATION)
 
 .venv-integration/ready: .venv/ready integration.lock
 	$(BIN)/python -m venv --clear .venv-integration

@@ -22,8 +22,8 @@ from echotruth.heart import Heart
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 
-LONGEST = ("test_states", "test_snakemake", "test_circulation", "test_checks")
-"""Modules that take half a minute and more, longest first."""
+LONGEST = ("test_site", "test_slurm", "test_snakemake", "test_circulation", "test_checks", "test_states")
+"""Modules that take a minute and more, longest first."""
 
 
 def pytest_collection_modifyitems(items):

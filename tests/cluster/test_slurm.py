@@ -1,4 +1,4 @@
-"""A SLURM of one node makes the bytes of a local run."""
+"""A SLURM of one node makes the bytes of jobs in one process."""
 
 import importlib.util
 import os
@@ -6,8 +6,11 @@ import shutil
 from pathlib import Path
 
 import pytest
-from finished_repository import content
-from workspace import COMMAND, Workspace
+import yaml
+from finished_repository import content, finish, solved
+from workspace import COMMAND, CONFIG, Workspace
+
+import echotruth as et
 
 PROGRAMS = ("slurmctld", "slurmd", "sbatch", "munged", "mungekey")
 SEARCHED = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
@@ -27,14 +30,14 @@ NOT_STARTED = 78
 """Status of the script if a daemon of the cluster did not start."""
 
 
-def test_slurm_makes_the_bytes_of_a_local_run(tmp_path):
-    local, cluster = Workspace(tmp_path / "local"), Workspace(tmp_path / "cluster")
-    local.echotruth("run", "tiny.yaml", "--cores", "2")
+def test_slurm_makes_the_bytes_of_jobs_in_one_process(tmp_path):
+    cluster = Workspace(tmp_path / "cluster")
     run = cluster.start("timeout", LIMIT, str(CLUSTER), *COMMAND, "run", "tiny.yaml", "--profile", "slurm")
     output, _ = run.communicate()
     if run.returncode == NOT_STARTED:
         pytest.skip(f"SLURM does not start on this machine: {output[-500:]}")
     assert run.returncode == 0, output
-    assert content(cluster.out) == content(local.out)
+    alone = finish(tmp_path / "alone/tiny", et.configure(yaml.safe_load(CONFIG)), solved)
+    assert content(cluster.out) == content(alone)
     submitted = (cluster.out / "logs/snakemake.log").read_text().count("has been submitted with SLURM jobid")
     assert submitted <= 5  # two hearts, their views, and repository with report; not one a rule and heart
