@@ -79,7 +79,7 @@ def rays(repository, hearts):
 @pytest.mark.slow
 def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_computed(rays, tmp_path):
     names, found = rays
-    network = names["train"](found, epochs=200)
+    network = names["train"](found, epochs=100)
     names["calibrate"](network, found)
     scores = names["scores"](network, found)
     assert scores["name"].tolist() == [one.name for one in found] and scores["ratio"].mean() < 0.9
