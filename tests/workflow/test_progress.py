@@ -55,7 +55,8 @@ def test_share_is_that_of_the_expected_time_and_the_rest_takes_as_long_in_propor
     assert progress.share == pytest.approx(40 / 120)
     assert progress.text == "1 of 6 jobs, 33 %, mechanics, rf, about 3 min left"
     progress = told("".join(ended("rf", number) for number in range(3, 7)) + ended("mechanics", 2), now=300)
-    assert progress.share == 1 and progress.text == "6 of 6 jobs, 100 %, starting"
+    assert progress.share == 1 and progress.text == "6 of 6 jobs, 100 %"
+    assert told("localrule all:\n    jobid: 0\n" + ended("all", 0), now=301).text == "6 of 6 jobs, 100 %"
 
 
 def test_jobs_of_a_group_on_a_cluster_are_read_as_others(told):

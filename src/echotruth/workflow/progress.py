@@ -79,12 +79,13 @@ class Progress:
     @property
     def text(self) -> str:
         """What is done, what runs and the time left, in one line; empty before anything is planned."""
-        steps = sum(self.planned.values()) - self.planned["all"]
+        steps, done = (sum(jobs.values()) - jobs["all"] for jobs in (self.planned, self.ended))
         if not steps:
             return ""
         at_work = Counter(step.rule for step in self.running.values())
         activity = ", ".join(f"{rule} x {number}" if number > 1 else rule for rule, number in at_work.items())
-        words = [f"{sum(self.ended.values())} of {steps} jobs, {100 * self.share:.0f} %", activity or "starting"]
+        words = [f"{done} of {steps} jobs, {100 * self.share:.0f} %"]
+        words += [activity or "starting"] if done < steps else []
         words += [f"{len(self.failed)} failed"] if self.failed else []
         if self.share > 0 and self._start is not None:
             left = (self.clock() - self._start) * (1 / self.share - 1)
