@@ -1,9 +1,6 @@
 """Meshes and motions of which everything is known, and a browser."""
 
-import fcntl
-import os
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +12,7 @@ import learning_repository
 import numpy as np
 import pytest
 import shown_repository
+from once import once
 
 from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Mesh
@@ -48,19 +46,6 @@ def browser():
         opened = playwright.chromium.launch(executable_path=chromium, args=QUIET)
         yield opened
         opened.close()
-
-
-def once(tmp_path_factory, name: str, make: Callable[[Path], object]) -> Path:
-    """Folder of a repository that is made once for all workers, and that nobody writes to."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name
-    made = folder.with_suffix(".made")
-    with folder.with_suffix(".lock").open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        if not made.exists():
-            make(folder)
-            made.touch()
-    return folder
 
 
 @pytest.fixture(scope="session")
@@ -100,15 +85,6 @@ def known(tmp_path_factory) -> known_repository.Known:
 def shown(tmp_path_factory) -> shown_repository.Shown:
     """A ring that moves by whole pixels, as the viewer and the report show it."""
     return shown_repository.shown_at(once(tmp_path_factory, "shown", shown_repository.make_shown))
-
-
-@pytest.fixture(scope="session")
-def reported(shown, tmp_path_factory) -> shown_repository.Shown:
-    """The repository `shown` with its report."""
-    from reported_repository import report  # loads what draws, and few tests need it
-
-    folder = once(tmp_path_factory, "reported", lambda to: report(shutil.copytree(shown.folder, to / "known")))
-    return replace(shown, folder=folder / "known")
 
 
 COARSE = Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1)

@@ -7,7 +7,10 @@ import sys
 from pathlib import Path
 
 import cores
+import yaml
+from finished_repository import finish, solved
 
+import echotruth as et
 from echotruth.workflow.lock import VARIABLE
 
 ROOT = Path(__file__).parents[1]
@@ -27,6 +30,11 @@ tracking: {trackers: {dis: {method: dis}}}
 cases: {seed: [1, 2]}
 """
 """A run that takes seconds: one heart, which moves as a rigid body, seen with two seeds."""
+
+
+def alone(folder: Path) -> Path:
+    """Folder of the repository of `CONFIG` that its jobs make in this process, one after the other."""
+    return finish(folder / "tiny", et.configure(yaml.safe_load(CONFIG)), solved)
 
 
 class Workspace:

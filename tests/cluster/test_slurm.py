@@ -6,11 +6,8 @@ import shutil
 from pathlib import Path
 
 import pytest
-import yaml
-from finished_repository import content, finish, solved
-from workspace import COMMAND, CONFIG, Workspace
-
-import echotruth as et
+from finished_repository import content
+from workspace import COMMAND, Workspace, alone
 
 PROGRAMS = ("slurmctld", "slurmd", "sbatch", "munged", "mungekey")
 SEARCHED = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
@@ -37,7 +34,6 @@ def test_slurm_makes_the_bytes_of_jobs_in_one_process(tmp_path):
     if run.returncode == NOT_STARTED:
         pytest.skip(f"SLURM does not start on this machine: {output[-500:]}")
     assert run.returncode == 0, output
-    alone = finish(tmp_path / "alone/tiny", et.configure(yaml.safe_load(CONFIG)), solved)
-    assert content(cluster.out) == content(alone)
+    assert content(cluster.out) == content(alone(tmp_path / "alone"))
     submitted = (cluster.out / "logs/snakemake.log").read_text().count("has been submitted with SLURM jobid")
     assert submitted <= 5  # two hearts, their views, and repository with report; not one a rule and heart

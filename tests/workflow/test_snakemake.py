@@ -11,11 +11,9 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-import yaml
-from finished_repository import content, finish, solved
-from workspace import ROOT, Workspace
+from finished_repository import content
+from workspace import COMMAND, ROOT, Workspace, alone
 
-import echotruth as et
 from echotruth.workflow.lock import VARIABLE
 
 SCRIPTS = sorted((ROOT / "workflow/scripts").glob("[!_]*.py"))
@@ -32,15 +30,14 @@ def made(tmp_path_factory) -> Workspace:
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory, made) -> dict[str, str]:
-    """What its jobs make in this process, one after the other."""
-    config = et.configure(yaml.safe_load((made.folder / "tiny.yaml").read_text()))
-    return content(finish(tmp_path_factory.mktemp("alone") / "tiny", config, solved))
+def expected(tmp_path_factory) -> dict[str, str]:
+    """What its jobs make in this process."""
+    return content(alone(tmp_path_factory.mktemp("alone")))
 
 
 @pytest.mark.slow
-def test_run_on_two_cores_makes_the_bytes_of_jobs_in_one_process(made, alone):
-    assert content(made.out) == alone
+def test_run_on_two_cores_makes_the_bytes_of_jobs_in_one_process(made, expected):
+    assert content(made.out) == expected
     assert re.search(
         r"Hearts: 2 complete\nTime: .*\nRepository: out/tiny/tiny.zarr\nReport: +out/tiny/report.html", made.told
     )
@@ -65,10 +62,10 @@ def test_nothing_is_made_again_in_a_copy_without_snakemakes_folder_and_with_othe
 
 
 @pytest.mark.slow
-def test_run_that_is_killed_with_all_its_jobs_and_run_again_is_one_that_went_on(alone, tmp_path):
+def test_run_that_is_killed_with_all_its_jobs_and_run_again_is_one_that_went_on(expected, tmp_path):
     workspace = Workspace(tmp_path / "killed")
     for pattern in ("hearts/*/zarr.json", "clips/*/mid/bmode/64/zarr.json"):
-        run = workspace.start(sys.executable, "-c", "from echotruth.cli import main; main()", "run", "tiny.yaml")
+        run = workspace.start(*COMMAND, "run", "tiny.yaml")
         while not any((workspace.out / "tiny.zarr").glob(pattern)):
             assert run.poll() is None, run.communicate()[0]
             time.sleep(0.02)
@@ -76,7 +73,7 @@ def test_run_that_is_killed_with_all_its_jobs_and_run_again_is_one_that_went_on(
         run.communicate()
         time.sleep(0.5)
     workspace.echotruth("run", "tiny.yaml", "repository")
-    assert content(workspace.out) == alone
+    assert content(workspace.out) == expected
 
 
 def test_graph_of_rules_is_the_way_of_a_view_and_nothing_is_written(tmp_path):
