@@ -25,7 +25,7 @@ dilation; `disease` healthy or diseased; `acoustics` realistic or ideal; `variat
 drawn conditions of realistic clips, which count as the others do."""
 
 ABOUT = ("attempt", "plane", "diagnosis", "ejection_fraction_percent", "failure", "is_closed", "judged_closed")
-"""`attempt` is the draw that gave a usable heart; `diagnosis` what bounds it (docs/physiology.md), as fresh or dcm;
+"""`attempt` is the draw that gave a usable heart; `diagnosis` as in cases.csv (earlier parts: fresh, late, unknown);
 `failure` why the tracker found nothing, or ""; `is_closed` whether the last frame is followed by the first, and
 `judged_closed` whether the trackers think so."""
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from echotruth.cases import diagnosis, expand, find_case, table
+from echotruth.cases import expand, find_case, table
 from echotruth.config import Config
 from echotruth.config.loading import ConfigError, load, override, validate
 from echotruth.config.table import MAX_BYTES, MAX_CASES, MAX_COLUMNS
@@ -251,24 +251,6 @@ def test_table_of_cases_has_labels_and_notes(hearts):
 
 
 BEATS = {"loop.kind": "circulation"}
-
-
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({}, "healthy"),
-        ({"pathology.infarct.radius_mm": 1.0}, "infarct"),
-        ({"pathology.activation.preset": "lbbb"} | BEATS, "late_activation"),
-        ({"pathology.activation.sites": [{}]} | BEATS, "late_activation"),
-        ({"pathology.activation.preset": "normal"} | BEATS, "healthy"),
-        ({"geometry.hypertrophy": 1.2, "pathology.infarct.segments": [1]}, "infarct+hypertrophy"),
-        ({"geometry.dilation": 1.2}, "dilation"),
-        ({"geometry.dilation": 0.9}, "healthy"),
-        ({"geometry.file": "a.vtu"}, "unknown"),
-    ],
-)
-def test_diagnosis_is_what_the_configuration_makes_of_the_heart(keys, words):
-    assert diagnosis(override(Config(), keys)) == words
 
 
 def test_blocks_of_the_page_are_valid(tmp_path, monkeypatch):

@@ -8,5 +8,5 @@ from echotruth.cases.expansion import all_cases as all_cases
 from echotruth.cases.expansion import expand as expand
 from echotruth.cases.expansion import find_case as find_case
 from echotruth.cases.ids import case_id as case_id
-from echotruth.cases.labels import diagnosis as diagnosis
 from echotruth.cases.tabulation import table as table
+from echotruth.config.diagnosis import diagnosis as diagnosis

@@ -5,25 +5,8 @@ from typing import Any
 
 from echotruth.cases.case import Case, Label
 from echotruth.cases.ids import integer_if_whole
-from echotruth.config import Config
+from echotruth.config.diagnosis import diagnosis
 from echotruth.config.table import LABEL
-
-
-def diagnosis(config: Config) -> str:
-    """What the configuration of a heart makes of it, as words joined by +.
-
-    `infarct` and `late_activation` are those of the section pathology, `hypertrophy` and `dilation` factors above 1 in
-    the section geometry. A heart with none of them is `healthy`, or `unknown` if its shape is read from a file.
-    """
-    infarct, order, geometry = config.pathology.infarct, config.pathology.activation, config.geometry
-    words = {
-        "infarct": infarct.is_there,
-        "late_activation": order.is_late,
-        "hypertrophy": geometry.hypertrophy > 1,
-        "dilation": geometry.dilation > 1,
-    }
-    found = "+".join(word for word, applies in words.items() if applies)
-    return found or ("healthy" if geometry.file is None else "unknown")
 
 
 def columns(cases: list[Case]) -> dict[str, list[Any]]:

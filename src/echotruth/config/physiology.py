@@ -11,8 +11,8 @@ class Physiology(Section):
     """Bounds on a solved heart; a heart outside is kept and marked with the reason. `null` switches a bound off.
 
     Defaults are those of healthy mice and rats, and enclose with a margin what the named sources measured; `human` has
-    others where people were measured to differ. In a heart with a disease, or with a circulation that is changed, those
-    from `edp_min_mmHg` on, and of the ejection fraction, are by default those of its diagnosis (docs/physiology.md).
+    others where people were measured to differ. In a heart that is not `healthy` in cases.csv, those from
+    `edp_min_mmHg` on, and of the ejection fraction, are by default those of its diagnosis (docs/physiology.md).
     """
 
     exclude_implausible: bool = True

@@ -137,7 +137,7 @@ class Figures:
         return physiology.draw(arrays | {"time": self.time}, physiology.PUBLISHED.get(species, {}))
 
     def population(self) -> Figure:
-        """Measures of all hearts by their diagnosis."""
+        """Measures of all hearts by their findings."""
         diagnoses = self.repository.cases.loc[self.repository.shown, "diagnosis"].to_numpy(str)
         return population.draw(measures(self.repository, self.repository.shown), diagnoses)
 

@@ -11,7 +11,7 @@ from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
 from echotruth import files
-from echotruth.cases.labels import diagnosis
+from echotruth.cases import diagnosis
 from echotruth.config import shipped
 from echotruth.evaluation.leaderboard import best
 from echotruth.report import account, board, style, vector

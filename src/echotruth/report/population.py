@@ -1,4 +1,4 @@
-"""Measures of all hearts by their diagnosis."""
+"""Measures of all hearts by their findings."""
 
 from collections.abc import Mapping
 
@@ -9,39 +9,41 @@ from matplotlib.figure import Figure
 from echotruth.report import style
 
 MAX_DOTS = 400
-"""Hearts of a diagnosis beyond which every k-th is drawn; the bar is that of all."""
+"""Hearts of a finding beyond which every k-th is drawn; the bar is that of all."""
 
 SPREAD = 0.28
-"""Half the width over which the dots of a diagnosis are spread."""
+"""Half the width over which the dots of a finding are spread."""
 
 
 @style.styled
 def draw(measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Figure:
-    """Draw a panel for each measure: a dot for every heart, and median and quartiles of each diagnosis.
+    """Draw a panel for each measure: a dot for every heart, and median and quartiles of each finding.
 
     Parameters
     ----------
     measures : mapping of str to ndarray of shape (heart,)
         Label with the unit -> values; NaN where a heart has none.
     diagnoses : ndarray of shape (heart,), str
+        Findings joined by +; a heart is a dot of each of its own.
     """
-    names = sorted(dict.fromkeys(map(str, diagnoses)), key=lambda name: (name != "healthy", name))
+    found = [str(words).split("+") for words in diagnoses]
+    names = sorted({name for each in found for name in each}, key=lambda name: (name != "healthy", name))
+    has = {name: np.array([name in each for each in found]) for name in names}
     figure = style.figure(9.6, 1.3 + 0.42 * len(names))
     panels = figure.subplots(1, len(measures), sharey=True, squeeze=False)[0]
     for panel, (label, values) in zip(panels, measures.items(), strict=True):
         for place, name in enumerate(names):
-            _diagnosis(panel, values[(diagnoses == name) & np.isfinite(values)], place)
+            _finding(panel, values[has[name] & np.isfinite(values)], place)
         panel.set_xlabel(label)
         panel.grid(axis="y", visible=False)
         panel.margins(x=0.08)
-    counts = [int(np.count_nonzero(diagnoses == name)) for name in names]
-    labels = [f"{name.replace('_', ' ').replace('+', ' + ')} ({n})" for name, n in zip(names, counts, strict=True)]
+    labels = [f"{name.replace('_', ' ')} ({np.count_nonzero(has[name])})" for name in names]
     panels[0].set_yticks(range(len(names)), labels)
     panels[0].set_ylim(len(names) - 0.5, -0.5)
     return figure
 
 
-def _diagnosis(axes: Axes, values: np.ndarray, place: int) -> None:
+def _finding(axes: Axes, values: np.ndarray, place: int) -> None:
     if not len(values):
         return
     dots = values[:: -(-len(values) // MAX_DOTS)]

@@ -171,9 +171,14 @@ class Repository:
         """What became of the heart of a case, which is read for it, but in object storage, where the table tells."""
         if self._remote:
             return status.Verdict(*self._table.loc[case, ["status", "reason"]])
-        differs = any(name.startswith(DECISIVE) for name in self.distinctions)
-        config = self.every[case].config if differs else self.config
+        config = self.case(case if self._bounds_differ else next(iter(self.rows))).config
         return status.verdict(self.attributes("heart", case), bounds_of(config))
+
+    @cached_property
+    def _bounds_differ(self) -> bool:
+        """Whether hearts have bounds of their own."""
+        decisive = [name for name in self.distinctions if name.startswith(DECISIVE)]
+        return any(self.distinctions[name].nunique(dropna=False) > 1 for name in decisive)
 
     @cached_property
     def rows(self) -> dict[str, int]:
