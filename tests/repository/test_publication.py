@@ -6,7 +6,7 @@ from contextlib import chdir
 import pandas as pd
 import pytest
 import xarray as xr
-from finished_repository import blank, configured, content, remake
+from finished_repository import blank, configured, content, finish, remake
 
 import echotruth as et
 from echotruth.cases import expand, table
@@ -81,6 +81,23 @@ def test_a_wider_bound_images_what_it_decides_otherwise_and_nothing_else(folder)
     kept = [name for name in before if name.startswith(("small.zarr/hearts", "small.zarr/clips/one"))]
     assert kept and all(after[name] == before[name] for name in kept)
     assert list(et.Repository(folder).cases["status"]) == ["complete", "complete", "failed"]
+
+
+@pytest.mark.parametrize(
+    ("swept", "statuses"),
+    [
+        ({"pathology.infarct.segments": [[7, 8]]}, ["complete"]),  # in all hearts, and not in the configuration itself
+        ({"mechanics.regional.contractility": [{}, {7: 0.1}]}, ["implausible", "complete"]),  # in no column
+    ],
+)
+def test_reader_judges_each_heart_by_its_own_findings(tmp_path, swept, statuses):
+    def congested(job):
+        found = blank(job)
+        job.notes["bounded"] = {"edp_max_mmHg": 20.0}
+        return found
+
+    finish(tmp_path, configured(views=("mid",), cases=swept), congested)
+    assert list(et.Repository(tmp_path).cases["status"]) == statuses
 
 
 def test_implausible_hearts_are_imaged_if_the_configuration_says_so(folder):

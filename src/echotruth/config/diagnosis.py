@@ -1,4 +1,4 @@
-"""Findings on a configured heart, from which its diagnosis and its bounds follow; docs/physiology.md has their sources."""
+"""Findings on a configured heart, from which its diagnosis and bounds follow; docs/physiology.md has the sources."""
 
 from __future__ import annotations
 
@@ -140,8 +140,8 @@ PARTS = {"dcm": ("weak", "abnormal_load", "dilation"), "hypertension": ("abnorma
 def findings(config: Config) -> tuple[str, ...]:
     """What is found in a heart by its configuration: keys of :data:`BOUNDS_OF`, none in a healthy heart.
 
-    `weak`, `hyperdynamic` and `abnormal_load` are beyond :data:`NORMAL`; `hypertrophy` and `dilation` factors above 1 on
-    the healthy heart, and `remodelling` one below; healthy hearts differ by their lengths, `scale` and `elongation`.
+    `weak`, `hyperdynamic` and `abnormal_load` are beyond :data:`NORMAL`; `hypertrophy` and `dilation` are factors above
+    1 on the healthy heart, `remodelling` one below; healthy hearts differ by their lengths, `scale` and `elongation`.
     `hypokinesia` and `fibrosis` are segments beyond :data:`WEAK_SEGMENT` and :data:`STIFF_SEGMENT`. A shape from a file
     with none of them is `unknown`.
     """
