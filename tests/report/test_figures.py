@@ -1,10 +1,12 @@
-"""Which hearts the figures and scores take in."""
+"""Which hearts the figures and scores take in, and where they stand."""
 
+import numpy as np
 import pandas as pd
 import pytest
 from finished_repository import begin, configured, finish
 
 from echotruth.config import Cases, Physiology
+from echotruth.report import population
 from echotruth.report.figures import NAMES, Figures
 from echotruth.repository.reader import Repository
 
@@ -46,3 +48,10 @@ def test_hearts_of_the_leaderboard_are_told_apart_by_their_label_or_by_their_mot
     folder = finish(tmp_path / "labelled", config)
     found = Figures(Repository(folder), folder / "figures").standings
     assert set(found["hearts"]) == {hearts}
+
+
+def test_heart_is_a_dot_of_each_of_its_findings():
+    figure = population.draw({"EF": np.array([60.0, 40.0, 50.0])}, np.array(["healthy", "weak+dilation", "weak"]))
+    (panel,) = figure.axes
+    assert [label.get_text() for label in panel.get_yticklabels()] == ["healthy (1)", "dilation (1)", "weak (2)"]
+    assert [sorted(line.get_xdata()) for line in panel.lines] == [[60], [40], [40, 50]]
