@@ -262,7 +262,7 @@ def _tell(line: str) -> None:
 def main() -> None:
     """Run parts of the benchmark, and bring the report up to date."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--peers", default=sys.executable, help="Python interpreter that has echotruth[peers]")
+    parser.add_argument("--peers", default=sys.executable, help="Python interpreter that has the extra peers")
     parser.add_argument("--parts", nargs="+", choices=list(PARTS), default=list(PARTS))
     parser.add_argument("--repeats", type=int, default=5, help="turns of each party")
     parser.add_argument("--results", type=Path, default=HERE / "results")

@@ -1,6 +1,6 @@
 """Learn to tell hearts with an infarct, against a threshold of tracked strain and against the ejection fraction.
 
-    pip install 'echotruth[torch]'
+    pip install '.[torch]'
     echotruth run config/infarcts.yaml
     python examples/diagnosis.py out/infarcts
 

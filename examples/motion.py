@@ -1,6 +1,6 @@
 """Learn the motion between two frames, against no motion and against two trackers.
 
-    pip install 'echotruth[torch]'
+    pip install '.[torch]'
     echotruth run config/infarcts.yaml
     python examples/motion.py out/infarcts
 

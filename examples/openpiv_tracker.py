@@ -1,6 +1,6 @@
 """OpenPIV's window deformation as it is, frame to frame, as a tracker for `echotruth evaluate`.
 
-    pip install 'echotruth[openpiv]'
+    pip install '.[openpiv]'
     echotruth evaluate out/demo --tracker examples.openpiv_tracker:track
 
 OpenPIV is under the GPL-3; echotruth itself does not use it.

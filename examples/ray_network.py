@@ -1,6 +1,6 @@
 """Learn to correct the tracker `bspline_dic`: the weights of `bspline_cnn`.
 
-    pip install 'echotruth[torch]'
+    pip install '.[torch]'
     echotruth run config/learning.yaml
     echotruth run config/learning_human.yaml
     echotruth run config/learning_ideal.yaml

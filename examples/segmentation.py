@@ -1,6 +1,6 @@
 """Learn to find the wall in single frames, against the mean wall and against the best blur and threshold.
 
-    pip install 'echotruth[torch]'
+    pip install '.[torch]'
     echotruth run config/infarcts.yaml
     python examples/segmentation.py out/infarcts
 

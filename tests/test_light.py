@@ -3,6 +3,7 @@
 The packages of the extra are absent for a process in which their names stand for no module.
 """
 
+import json
 import shutil
 import subprocess
 import sys
@@ -10,10 +11,11 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+import pytest
 from packaging.requirements import Requirement
 
 import echotruth as et
-from echotruth.extras import MAKE
+from echotruth.extras import MAKE, installation
 
 PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
 
@@ -44,7 +46,7 @@ assert paths.shape == (10, 8, 2) and np.isfinite(paths).all()
 assert np.isfinite(et.learning.FlowPairs("sample", chosen)[0]["flow"]).any()
 """
 
-WHOLE = "needs the package {}: pip install 'echotruth[make]'"
+WHOLE = f"needs the package {{}}: {installation('make')}"
 NEEDED = {
     "show sample --no-browser": "bokeh",
     "run demo --dry-run": "scipy",
@@ -85,7 +87,7 @@ def test_command_that_needs_more_says_which_extra_in_one_line(tmp_path):
     done = light(COMMANDS, tmp_path)
     said = [f"echotruth: {command.split()[0]} {WHOLE.format(package)}" for command, package in NEEDED.items()]
     said[-2] = f"echotruth: the tracker dis {WHOLE.format('cv2')}"
-    said[-1] = "echotruth: a.onnx needs the package onnxruntime: pip install 'echotruth[onnx]'"
+    said[-1] = f"echotruth: a.onnx needs the package onnxruntime: {installation('onnx')}"
     assert (done.returncode, done.stderr.splitlines()) == (0, said)
 
 
@@ -101,6 +103,26 @@ for call in (lambda: et.beat(), lambda: et.sample().difficulty("infarct", "mid")
 """
     said = [f"echotruth.beat {WHOLE.format('numba')}", f"difficulty {WHOLE.format('scipy')}"]
     assert light(program, tmp_path).stdout.splitlines() == said
+
+
+@pytest.mark.parametrize(("note", "command"), [
+    (None, "pip install 'echotruth[make]'"),
+    ({"url": "file:///gone/echotruth", "dir_info": {}}, "pip install 'echotruth[make]'"),
+    ({"url": "https://example.org/echotruth.whl", "archive_info": {}}, "pip install 'echotruth[make]'"),
+    ({"url": "FOLDER", "dir_info": {}}, "pip install 'FOLDER[make]'"),
+    ({"url": "FOLDER", "dir_info": {"editable": True}}, "pip install -e 'FOLDER[make]'"),
+])  # fmt: skip
+def test_extra_is_installed_from_where_the_package_came(tmp_path, monkeypatch, note, command):
+    folder = tmp_path / "a folder"
+    information = tmp_path / "site/echotruth-0.dist-info"
+    for path in (folder, information):
+        path.mkdir(parents=True)
+    (information / "METADATA").write_text("Name: echotruth\n")
+    if note:
+        text = json.dumps(note).replace("FOLDER", folder.as_uri())
+        (information / "direct_url.json").write_text(text)
+    monkeypatch.setattr(sys, "path", [str(tmp_path / "site")])
+    assert installation("make") == command.replace("FOLDER", str(folder))
 
 
 def test_extra_has_the_packages_that_are_named():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from echotruth import learning
+from echotruth.extras import installation
 
 BLOCKED = "import sys; sys.modules['torch'] = None; import echotruth.torch"
 
@@ -16,7 +17,7 @@ def test_missing_pytorch_is_told_in_one_sentence_with_the_extra():
     found = subprocess.run([sys.executable, "-c", BLOCKED], capture_output=True, text=True, check=False)
     assert found.returncode == 1
     last = found.stderr.strip().splitlines()[-1]
-    assert last == "ModuleNotFoundError: echotruth.torch needs PyTorch: pip install 'echotruth[torch]'"
+    assert last == f"ModuleNotFoundError: echotruth.torch needs PyTorch: {installation('torch')}"
 
 
 @pytest.fixture(scope="module")

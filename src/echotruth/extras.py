@@ -1,8 +1,13 @@
 """Packages that `pip install echotruth` leaves out, and the extra that installs them."""
 
+import json
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import distributions
 from importlib.util import find_spec
+from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
 MAKE = (
     *("bokeh", "cv2", "imageio_ffmpeg", "matplotlib", "meshio", "numba", "pypardiso", "pyvista"),
@@ -35,12 +40,22 @@ def explained(what: str) -> Iterator[None]:
         package = str(error.name).partition(".")[0]
         if isinstance(error, MissingPackage) or package not in MAKE:
             raise
-        raise MissingPackage(
-            f"{what} needs the package {package}: pip install 'echotruth[make]'", name=package
-        ) from None
+        raise MissingPackage(f"{what} needs the package {package}: {installation('make')}", name=package) from None
 
 
 def require(package: str) -> None:
     """Raise the error of an import of a package that is not installed, without importing it."""
     if find_spec(package) is None:
         raise ModuleNotFoundError(f"No module named {package!r}", name=package)
+
+
+def installation(extra: str) -> str:
+    """Command that installs an extra, from the folder or wheel of which echotruth was installed if it is still there."""
+    # PEP 610: pip and uv note where what they install comes from, unless it is an index.
+    notes = (found.read_text("direct_url.json") for found in distributions(name="echotruth"))
+    note = json.loads(next(notes, None) or "{}")
+    source = unquote(urlsplit(note.get("url", "")).path)
+    if not note.get("url", "").startswith("file:") or not Path(source).exists():
+        return f"pip install 'echotruth[{extra}]'"
+    editable = "-e " if note.get("dir_info", {}).get("editable") else ""
+    return f"pip install {editable}{shlex.quote(f'{source}[{extra}]')}"

@@ -1,6 +1,7 @@
 """The sequences of :mod:`echotruth.learning` as PyTorch data sets, whose items are dicts of tensors.
 
 >>> from echotruth import learning
+from echotruth.extras import installation
 >>> from echotruth.torch import FlowPairs, loader
 >>> parts = learning.split(learning.cases("sample"), {"train": 0.7, "test": 0.3}, seed=3)
 >>> batch = next(iter(loader(FlowPairs("sample", parts["train"]), 8)))
@@ -13,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from echotruth import learning
+from echotruth.extras import installation
 from echotruth.learning import Item, Items
 
 try:
@@ -21,7 +23,7 @@ try:
 except ModuleNotFoundError as error:
     if error.name != "torch":
         raise
-    raise ModuleNotFoundError("echotruth.torch needs PyTorch: pip install 'echotruth[torch]'", name="torch") from None
+    raise ModuleNotFoundError(f"echotruth.torch needs PyTorch: {installation('torch')}", name="torch") from None
 
 __all__ = ["Clips", "Diagnosis", "FlowPairs", "PointTracks", "Segmentation", "Strain", "Tensors", "loader", "tensors"]
 

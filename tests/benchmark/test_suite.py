@@ -219,7 +219,7 @@ def test_what_is_not_there_is_refused_in_one_line(made, monkeypatch, capsys, arg
 
 def test_package_that_is_missing_is_told_in_one_line(made, monkeypatch, capsys):
     def without(*_):
-        raise MissingPackage("model.onnx needs the package onnxruntime: pip install 'echotruth[onnx]'")
+        raise MissingPackage("model.onnx needs the package onnxruntime")
 
     monkeypatch.setattr(parts, "make_part", without)
     monkeypatch.setattr("sys.argv", ["suite", "part", "1"])

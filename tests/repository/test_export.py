@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from echotruth.extras import installation
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, Selection
 
@@ -256,7 +257,7 @@ def test_missing_h5py_is_said_in_one_line(folder):
     command = ["export", str(folder), "--format", "uff", "--case", "heart", "--view", "mid"]
     done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == "echotruth: needs the package h5py: pip install 'echotruth[export]'\n"
+    assert done.stderr == f"echotruth: needs the package h5py: {installation('export')}\n"
 
 
 def test_command_writes_the_file_and_says_where(folder, tmp_path):

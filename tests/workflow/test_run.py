@@ -87,7 +87,7 @@ def test_what_is_to_be_made_is_told_from_options(given, options, targets):
     assert split_targets(given.split()) == (options.split(), targets.split())
 
 
-@pytest.mark.parametrize(("executor", "remedy"), [("slurm", "'echotruth[slurm]'"), ("lsf", "executor-plugin-lsf")])
+@pytest.mark.parametrize(("executor", "remedy"), [("slurm", "[slurm]'"), ("lsf", "executor-plugin-lsf")])
 def test_missing_package_of_the_executor_of_a_profile_is_named_with_its_remedy(tmp_path, monkeypatch, executor, remedy):
     monkeypatch.setattr("echotruth.cli.snakemake.find_spec", lambda name: None)
     (tmp_path / "mine").mkdir()

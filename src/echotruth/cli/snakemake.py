@@ -10,6 +10,7 @@ from pathlib import Path
 import yaml
 
 from echotruth.config import shipped
+from echotruth.extras import installation
 
 TARGETS = ("all", "repository", "report")
 """Rules that can be asked for by their names: they are for all hearts."""
@@ -115,8 +116,8 @@ def executor_error(options: list[str]) -> str | None:
     package = f"snakemake-executor-plugin-{executor}"
     if find_spec(package.replace("-", "_")) is not None:
         return None
-    wanted = "'echotruth[slurm]'" if executor == "slurm" else package
-    return f"executor {executor}: needs the package {package}: pip install {wanted}"
+    remedy = installation("slurm") if executor == "slurm" else f"pip install {package}"
+    return f"executor {executor}: needs the package {package}: {remedy}"
 
 
 def cores(options: list[str]) -> int:

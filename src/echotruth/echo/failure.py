@@ -4,6 +4,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from echotruth.extras import installation
+
 FACTS = {"spacing_mm": "the side of its pixels", "frame_time_ms": "the time from frame to frame", "view": "its view"}
 """Options that say what a file may not, and what that is."""
 FEWEST_FRAMES = 3
@@ -34,4 +36,4 @@ def optional(package: str, path: Path) -> Any:
     try:
         return import_module(package)
     except ImportError:
-        raise EchoError(f"{path}: needs the package {package}: pip install 'echotruth[clinical]'") from None
+        raise EchoError(f"{path}: needs the package {package}: {installation('clinical')}") from None

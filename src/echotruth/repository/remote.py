@@ -12,6 +12,8 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from echotruth.extras import installation
+
 if TYPE_CHECKING:
     from obstore.store import S3Store
     from zarr.storage import ObjectStore
@@ -53,7 +55,7 @@ class Remote:
         try:
             import obstore
         except ImportError:
-            raise RemoteError(f"{url}: needs the package obstore: pip install 'echotruth[s3]'") from None
+            raise RemoteError(f"{url}: needs the package obstore: {installation('s3')}") from None
         self.url, self._api = url.rstrip("/"), obstore
         self.store = self._asked(lambda: _store(self.url))
 

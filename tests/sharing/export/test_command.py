@@ -11,6 +11,7 @@ from known_repository import SIZES
 
 from echotruth import cli
 from echotruth.cases import expand
+from echotruth.extras import installation
 from echotruth.repository import metadata
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, ExportError, Selection, destination, png
@@ -76,7 +77,7 @@ def test_folder_without_a_repository_is_refused(tmp_path, monkeypatch, capsys):
 def test_missing_package_is_said_with_what_to_install(known, monkeypatch, tmp_path, capsys, name, package):
     monkeypatch.setitem(sys.modules, package, None)
     assert call(monkeypatch, known.folder, "--format", name, "-o", tmp_path) == 2
-    assert capsys.readouterr().err == f"echotruth: needs the package {package}: pip install 'echotruth[clinical]'\n"
+    assert capsys.readouterr().err == f"echotruth: needs the package {package}: {installation('clinical')}\n"
     assert not list(tmp_path.iterdir())
 
 

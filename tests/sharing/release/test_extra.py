@@ -5,6 +5,7 @@ import sys
 import pytest
 
 import echotruth as et
+from echotruth.extras import installation
 from echotruth.sharing.description import DescriptionError, describe
 from echotruth.sharing.release import release
 
@@ -15,5 +16,5 @@ def test_missing_extra_is_told_in_one_sentence_and_nothing_is_written(tmp_path, 
     monkeypatch.setitem(sys.modules, "mlcroissant", None)
     with pytest.raises(DescriptionError) as told:
         write(et.sample(), tmp_path / "files")
-    assert str(told.value) == f"{write.__name__} needs the package mlcroissant: pip install 'echotruth[description]'"
+    assert str(told.value) == f"{write.__name__} needs the package mlcroissant: {installation('description')}"
     assert not any(tmp_path.iterdir())

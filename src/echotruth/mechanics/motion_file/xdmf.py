@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.extras import installation
 from echotruth.mechanics.geometry.imported_mesh import ImportedMesh
 from echotruth.mechanics.prescribed import MotionError
 
@@ -130,8 +131,8 @@ class _Reader:
         try:
             import h5py
         except ImportError:
-            remedy = "install it, with pip install 'echotruth[export]'"
-            raise MotionError(f"{self._path}: its numbers are in HDF5, which needs h5py: {remedy}.") from None
+            said = f"its numbers are in HDF5, which needs h5py: install it, with {installation('export')}"
+            raise MotionError(f"{self._path}: {said}.") from None
         name, _, dataset = text.partition(":")
         with h5py.File(self._beside(name), "r") as file:
             return np.asarray(file[dataset])

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 from echotruth import files
+from echotruth.config import shipped
+from echotruth.extras import installation
 from echotruth.repository.reader import Repository
 from echotruth.sharing.description import citation, statements
 from echotruth.sharing.description.attribution import Attribution
@@ -25,14 +27,18 @@ def describe(repository: Repository, output: Path | None = None, given: Attribut
     Raises
     ------
     DescriptionError
-        If it is not finished, damaged, or holds a README.md or CITATION.cff of somebody else, or a package is missing.
+        If it is not finished, damaged, or holds a README.md or CITATION.cff of somebody else, if the folder is that of
+        the sample, or a package is missing.
     """
+    folder = output or repository.folder
+    if shipped.is_sample(folder):
+        remedy = "give another folder with --output"
+        raise DescriptionError(f"{folder}: comes with the package and is not written to: {remedy}")
     try:
         from echotruth.sharing.description.croissant import croissant
     except ModuleNotFoundError as error:
-        remedy = "pip install 'echotruth[description]'"
+        remedy = installation("description")
         raise DescriptionError(f"describe needs the package {error.name}: {remedy}") from None
-    folder = output or repository.folder
     for name, mark in {"README.md": statements.MARK, "CITATION.cff": citation.MARK}.items():
         if (folder / name).is_file() and not (folder / name).read_bytes().startswith(mark.encode()):
             remedy = "move it away, or choose another --output"

@@ -3,6 +3,8 @@
 from importlib import import_module
 from typing import Any
 
+from echotruth.extras import installation
+
 
 class ExportError(ValueError):
     """Raised if something cannot be exported; the message says why, and what to do."""
@@ -14,4 +16,4 @@ def optional(package: str) -> Any:
         return import_module(package)
     except ImportError:
         extra = "export" if package == "h5py" else "clinical"
-        raise ExportError(f"needs the package {package}: pip install 'echotruth[{extra}]'") from None
+        raise ExportError(f"needs the package {package}: {installation(extra)}") from None

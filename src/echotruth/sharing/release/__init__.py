@@ -10,6 +10,7 @@ import yaml
 
 from echotruth import files
 from echotruth.config import shipped
+from echotruth.extras import installation
 from echotruth.repository.reader import Repository
 from echotruth.sharing.description.attribution import Attribution
 from echotruth.sharing.description.citation import citation, filled
@@ -65,7 +66,7 @@ def release(
     try:
         from echotruth.sharing.description.croissant import croissant
     except ModuleNotFoundError as error:
-        remedy = "pip install 'echotruth[description]'"
+        remedy = installation("description")
         raise DescriptionError(f"release needs the package {error.name}: {remedy}") from None
     facts = read_facts(repository, given or Attribution())
     draft = folder.with_name(f".partial-{folder.name}")

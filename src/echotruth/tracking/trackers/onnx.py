@@ -10,7 +10,7 @@ from PIL import Image
 from echotruth.arrays import Floats
 from echotruth.config.loading import checked, read_yaml
 from echotruth.config.tracking import Onnx, OnnxSignature
-from echotruth.extras import MissingPackage
+from echotruth.extras import MissingPackage, installation
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.grey import grey_levels
@@ -150,7 +150,7 @@ def _session(path: Path) -> Any:
     try:
         import onnxruntime
     except ModuleNotFoundError:
-        raise MissingPackage(f"{path} needs the package onnxruntime: pip install 'echotruth[onnx]'") from None
+        raise MissingPackage(f"{path} needs the package onnxruntime: {installation('onnx')}") from None
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
