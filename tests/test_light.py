@@ -4,6 +4,7 @@ The packages of the extra are absent for a process in which their names stand fo
 """
 
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -17,7 +18,8 @@ from packaging.requirements import Requirement
 import echotruth as et
 from echotruth.extras import MAKE, installation
 
-PROJECT = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text())["project"]
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 LIGHT = f"""
 import sys
@@ -44,6 +46,14 @@ chosen = et.learning.cases("sample")
 paths = et.learning.PointTracks("sample", chosen, points=8)[0]["position"]
 assert paths.shape == (10, 8, 2) and np.isfinite(paths).all()
 assert np.isfinite(et.learning.FlowPairs("sample", chosen)[0]["flow"]).any()
+"""
+
+FIRST = """
+import shlex
+from echotruth.cli import main
+for command in {!r}:
+    sys.argv = shlex.split(command, comments=True)
+    main()
 """
 
 WHOLE = f"needs the package {{}}: {installation('make')}"
@@ -77,6 +87,17 @@ def light(program: str, folder: Path) -> subprocess.CompletedProcess[str]:
 def test_light_installation_reads_loads_and_scores(tmp_path):
     done = light(READ, tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/start/install.md"])
+def test_commands_that_follow_the_light_installation_run(tmp_path, page):
+    text = (ROOT / page).read_text().partition("pip install . ")[2].partition("pip install '.[make]'")[0]
+    commands = re.findall(r"^ *(echotruth .*)", text, re.MULTILINE)
+    folder = tmp_path / "first hour"
+    folder.mkdir()
+    done = light(FIRST.format(commands), folder)
+    assert commands and done.returncode == 0, done.stderr
+    assert len([*folder.glob("clips/*.gif")]) == 4
 
 
 def test_command_that_needs_more_says_which_extra_in_one_line(tmp_path):

@@ -1,12 +1,16 @@
-"""The pages: their commands are known, their configurations valid, their notebooks without outputs."""
+"""The pages: their commands are known, what those of the first hour show runs, their configurations are valid."""
 
 import json
 import re
 import shlex
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import pytest
 import yaml
+from cli.command_line import run_cli
 
 import echotruth as et
 from echotruth.cli import parser
@@ -44,6 +48,39 @@ def test_commands_are_found_on_the_pages():
     found = [arguments for page in PAGES for arguments in commands(page.read_text())]
     assert len(found) > 30
     assert {"run", "check", "evaluate", "export"} <= {arguments[0] for arguments in found}
+
+
+FIRST_PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/start/*.md"))]
+COARSE = {
+    "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
+    **{"loop": {"frames": 4}, "bmode": {"size_px": 128, "downsampling": [1]}, "rf": {"lines": 24}},
+}
+"""Heart and images that are made in seconds."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", FIRST_PAGES, ids=lambda page: page.stem)
+def test_python_of_the_first_hour_runs_as_it_stands_in_a_folder_with_a_space(page, demo, monkeypatch):
+    """The heart of README.md is coarser, and `out/infarcts` is the sample."""
+    (demo / "out/infarcts").unlink(missing_ok=True)
+    (demo / "out/infarcts").symlink_to(et.sample().folder)
+    monkeypatch.chdir(demo)
+    monkeypatch.setattr(plt, "show", plt.close)
+    monkeypatch.setattr(et, "configure", partial(et.configure, COARSE))
+    names: dict[str, object] = {}
+    for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
+        if "echotruth.torch" not in block or find_spec("torch"):
+            exec(block, names)
+    assert names or page.stem in ("install", "cluster")
+
+
+@pytest.mark.parametrize("page", FIRST_PAGES, ids=lambda page: page.stem)
+def test_commands_of_the_first_hour_that_read_a_configuration_run_as_they_stand(page, tmp_path):
+    for arguments in commands(page.read_text()):
+        is_cheap = arguments[0] in ("new", "check", "cases") or "--estimate" in arguments
+        if is_cheap and not any(word.startswith(("out/", "config/")) for word in arguments):
+            status, _, errors = run_cli(*arguments, cwd=tmp_path)
+            assert status == 0, (arguments, errors)
 
 
 @pytest.mark.parametrize("name", ["own_heart", "own_array"])

@@ -1,0 +1,30 @@
+"""What the pages speak of, made in seconds."""
+
+import learning_repository
+import pytest
+from finished_repository import configured
+
+from echotruth.config import Bmode, Geometry, Rf, Tracking, View
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory):
+    """Folder, with a space in its name, in which `out/demo` is a repository like that of config/demo.yaml, made in seconds."""
+    folder = tmp_path_factory.mktemp("first hour")
+    planes = {
+        "base": View(position=0.2),
+        "mid": View(),
+        "apex": View(position=0.8),
+        "long_axis": View(plane="long_axis"),
+    }
+    config = configured(
+        name="demo",
+        views=("mid",),
+        cases={},
+        bmode=Bmode(size_px=128, downsampling=(1,)),
+        rf=Rf(lines=24, focal_zones=1),
+        tracking=Tracking(grid_px=4, trackers={"dis": {"method": "dis"}, "bspline_dic": {"method": "bspline_dic"}}),
+        geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
+    ).model_copy(update={"views": planes})
+    learning_repository.make(folder / "out/demo", config)
+    return folder
