@@ -26,6 +26,7 @@ include_patterns = [
     "README.md",
     "CHANGELOG.md",
     "CONTRIBUTING.md",
+    "SECURITY.md",
     "config/README.md",
     "benchmarks/README.md",
     "benchmarks/results/*.md",

@@ -5,9 +5,11 @@ import subprocess
 import sys
 import tarfile
 import zipfile
+from email import message_from_string
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).parents[1]
 
@@ -48,6 +50,15 @@ def files(folder: Path) -> set[str]:
 
 def test_wheel_made_from_the_sdist_has_every_file_of_the_package(wheel):
     assert files(ROOT / "src/echotruth") - files(wheel / "echotruth") == set()
+
+
+def test_wheel_names_the_authors_of_the_citation_and_is_typed(wheel):
+    (file,) = wheel.glob("*.dist-info/METADATA")
+    metadata = message_from_string(file.read_text())
+    people = yaml.safe_load((ROOT / "CITATION.cff").read_text())["authors"]
+    assert metadata["Author"] == ", ".join(person["name"] for person in people)
+    assert metadata["License-Expression"] == "BSD-3-Clause" and "Typing :: Typed" in metadata.get_all("Classifier")
+    assert (wheel / "echotruth/py.typed").is_file()
 
 
 def test_sdist_has_tests_and_docs_and_no_data_but_the_sample(sdist):

@@ -50,7 +50,7 @@ def require(package: str) -> None:
 
 
 def installation(extra: str) -> str:
-    """Command that installs an extra, from the folder or wheel of which echotruth was installed if it is still there."""
+    """Command that installs an extra, from the folder or wheel echotruth was installed from if it is still there."""
     # PEP 610: pip and uv note where what they install comes from, unless it is an index.
     notes = (found.read_text("direct_url.json") for found in distributions(name="echotruth"))
     note = json.loads(next(notes, None) or "{}")

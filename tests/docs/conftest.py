@@ -9,7 +9,7 @@ from echotruth.config import Bmode, Geometry, Rf, Tracking, View
 
 @pytest.fixture(scope="session")
 def demo(tmp_path_factory):
-    """Folder, with a space in its name, in which `out/demo` is a repository like that of config/demo.yaml, made in seconds."""
+    """Folder, its name with a space, in which `out/demo` is a repository like that of config/demo.yaml."""
     folder = tmp_path_factory.mktemp("first hour")
     planes = {
         "base": View(position=0.2),

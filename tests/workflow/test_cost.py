@@ -1,11 +1,12 @@
 """What a run is expected to take follows from its jobs, and grows with what makes them larger."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from echotruth.cases import expand
-from echotruth.config import Config
+from echotruth.config import Config, shipped
 from echotruth.config.loading import load
 from echotruth.workflow import cost
 from echotruth.workflow.concerns import concerns
@@ -48,6 +49,33 @@ def test_table_adds_up_and_the_demo_takes_minutes():
     assert [line.split()[0] for line in lines[1 : 1 + len(rules)]] == rules
     (time,) = [line for line in lines if line.startswith("Time: ")]
     assert "min of CPU time" in time and "on 2 cores" in time
+
+
+def test_no_number_of_cores_makes_a_run_shorter_than_the_jobs_of_a_heart_that_wait_for_each_other():
+    config = load(ROOT / "config/demo.yaml")
+    at_least = sum(cost.seconds(rule, config) for rule in ("mechanics", "phantom", "rf", "bmode", "tracking", "report"))
+    assert at_least < cost.chain(config) < at_least + 30
+    few, many = cost.table(config, 1, 1, 2), cost.table(config, 1, 1, 200)
+    assert f"about {cost.duration(cost.chain(config))} on 200 cores" in many and "about 3 min on 2 cores" in few
+
+
+def test_files_are_about_those_of_a_repository():
+    sample = shipped.sample()
+    config = load(sample / "config.yaml")
+    (line,) = [line for line in cost.table(config, 2, 2, 1).splitlines() if line.startswith("Disk: ")]
+    megabytes, files = map(int, re.findall(r"\d+", line))
+    # It has no lines and no scatterers, which are 40 files of a view.
+    found = [path for path in (sample / "sample.zarr").rglob("*") if path.is_file()]
+    assert files == pytest.approx(len(found) + 4 * 40, rel=0.1) and 5 < megabytes < 30
+
+
+def test_page_on_clusters_has_time_and_memory_of_the_jobs():
+    rows = re.findall(r"^\| .* (\w+) trackers?\) \| (.*) \|$", (ROOT / "docs/cluster.md").read_text(), re.MULTILINE)
+    for (trackers, cells), name in zip(rows, ("demo", "sweep"), strict=True):
+        config = load(ROOT / f"config/{name}.yaml")
+        assert {"three": 3, "six": 6}[trackers] == len(config.tracking.trackers)
+        asked = [cost.resources(rule, config) for rule in ("mechanics", "phantom", "rf", "truth", "bmode", "tracking")]
+        assert cells.split(" | ") == [f"{job['runtime']} min, {job['mem_mb'] / 1000:.1f} GB" for job in asked]
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth run`."""
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
-    parser.add_argument("--estimate", action="store_true", help="only print what it will take: jobs, CPU time, GB")
+    parser.add_argument("--estimate", action="store_true", help="only print what it will take: jobs, time, disk")
     parser.add_argument("--yes", action="store_true", help="run it even if its images make no sense")
 
 

@@ -29,6 +29,8 @@ FILE_CELLS = 60_000
 """Tetrahedra assumed in a mesh from a file, whose size is not known before it is read."""
 MEGABYTES_OF_FRAME = 1.2
 """Size on disk of a frame of a view of the default heart, in three sizes, MB, with its lines and six trackers."""
+FILES_OF_HEART, FILES_OF_VIEW, FILES_OF_SIZE = 187, 43, 163
+"""Files of a heart, of a view, and of a view more for each image size (docs/size.md)."""
 
 
 def scale(rule: str, config: Config, size: int = 0) -> float:
@@ -92,6 +94,13 @@ def jobs(config: Config, hearts: int, cases: int) -> dict[str, int]:
     return found | ({"inference": cases} if config.inference.tracker else {}) | {"repository": 1, "report": 1}
 
 
+def chain(config: Config) -> float:
+    """Time of the longest chain of jobs that wait for each other, s: no number of cores makes a run shorter."""
+    took = {rule: seconds(rule, config) for rule in jobs(config, 1, 1)}
+    # Tracking waits for both, which are made side by side.
+    return sum(took.values()) - min(took["truth"], took["phantom"] + took["rf"] + took["bmode"])
+
+
 def table(config: Config, hearts: int, cases: int, cores: int) -> str:
     """What a run will take, a line for each rule: jobs and CPU time, and what the repository takes on disk."""
     lines, total = [f"{'':13} {'jobs':>7} {'CPU time':>9}"], 0.0
@@ -100,13 +109,14 @@ def table(config: Config, hearts: int, cases: int, cores: int) -> str:
         took = number / len(sizes) * sum(seconds(rule, config, size) for size in sizes)
         lines.append(f"{rule:13} {number:>7} {duration(took):>9}")
         total += took
-    megabyte = (
-        cases * len(config.views) * config.loop.frames * MEGABYTES_OF_FRAME * max(config.bmode.sizes) ** 2 / PIXELS
-    )
-    lines += ["", f"Time: {duration(total)} of CPU time, about {duration(total / cores)} on {cores} cores"]
-    return "\n".join(
-        [*lines, f"Disk: {megabyte / 1e3:.1f} GB", "Based on the default heart on a core of an Intel Xeon"]
-    )
+    views = cases * len(config.views)
+    size_MB = views * config.loop.frames * MEGABYTES_OF_FRAME * max(config.bmode.sizes) ** 2 / PIXELS
+    disk = f"{size_MB / 1e3:.1f} GB" if size_MB >= 1e3 else f"{size_MB:.0f} MB"
+    number = hearts * FILES_OF_HEART + views * (FILES_OF_VIEW + FILES_OF_SIZE * len(config.bmode.sizes))
+    took = max(total / cores, chain(config))
+    lines += ["", f"Time: {duration(total)} of CPU time, about {duration(took)} on {cores} cores"]
+    lines += [f"Disk: {disk}, about {number} files", "Based on the default heart on a core of an Intel Xeon"]
+    return "\n".join(lines)
 
 
 def duration(seconds: float) -> str:
