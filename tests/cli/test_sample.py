@@ -99,6 +99,14 @@ def test_what_is_exported_lies_in_the_working_folder(call, tmp_path, untouched):
     assert [path.name for path in tmp_path.glob("out/sample/export/csv/*")] == ["infarct_mid_256.csv", "summary.csv"]
 
 
+def test_formats_of_rf_say_that_the_sample_has_none_and_what_makes_it(call, untouched):
+    status, _, errors = call("export", "sample", "--format", "uff")
+    assert status == 2 and errors.startswith(
+        "echotruth: sample: comes without RF, which uff needs: echotruth run sample"
+    )
+    assert errors.count("\n") == 1
+
+
 def test_difficulty_is_not_kept_in_the_package(untouched, monkeypatch):
     monkeypatch.setattr("echotruth.evaluation.difficulty.table.difficulty", lambda *_: [])
     assert et.sample().difficulty("infarct", "mid").empty

@@ -1,5 +1,7 @@
 """The shipped cycles, the columns of the prescribed quantities, the sampling, and the errors about invalid files."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -171,7 +173,7 @@ def test_tension_that_no_beat_has_is_refused(tmp_path, rows, message):
 
 
 def test_missing_file_is_named_with_what_there_is(tmp_path):
-    with pytest.raises(LoopError, match=r"no readable loop of this name; .*\(human, mouse, rat, twitch\)"):
+    with pytest.raises(LoopError, match=rf"no file {Path('dog').absolute()}; .*\(human, mouse, rat, twitch\)"):
         read_loop(Loop(file="dog"))
 
 

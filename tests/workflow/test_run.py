@@ -63,13 +63,19 @@ def test_configuration_is_not_changed_behind_its_file(option):
     assert option_errors([option, "seed=3"]) == [f"{option}: change the file of the configuration"]
 
 
-def test_configuration_is_not_taken_for_a_profile(tmp_path):
+def test_configuration_or_misspelt_name_is_not_taken_for_a_profile(tmp_path, monkeypatch):
     (tmp_path / "mine").mkdir()
     (tmp_path / "config.yaml").write_text("jobs: 2\n")
     (tmp_path / "tiny.yaml").write_text("name: tiny\n")
+    (tmp_path / "home/snakemake/cluster").mkdir(parents=True)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
     with chdir(tmp_path):
-        assert all(option_errors(["--profile", name]) == [] for name in ("mine", "slurm", "none", "config.yaml"))
+        known = "mine", "slurm", "none", "config.yaml", "cluster"
+        assert all(option_errors(["--profile", name]) == [] for name in known)
         (swapped,) = option_errors(["--profile", "tiny.yaml"])
+        (misspelt,) = option_errors(["--profile", "slrm"])
+    remedy = "(did you mean slurm?): give default or slurm, or a folder that holds a config.yaml"
+    assert misspelt == f"--profile slrm: is not a profile {remedy}"
     assert swapped.startswith("--profile tiny.yaml: is not a profile: give") and "slurm" in swapped
     assert swapped.endswith("the file of the configuration comes before the options")
 

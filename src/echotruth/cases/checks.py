@@ -94,7 +94,7 @@ def check_files(hearts: list[tuple[Combination, Case]], source: str) -> None:
             where = place if heart.origin else f"{source}: cases.geometry.file"
             raise ConfigError(f"{where}: the meshes may differ in size: set geometry.remesh: true")
         if geometry.file not in known and not Path(str(geometry.file)).is_file():
-            remedy = "file not found: give its path from this folder"
+            remedy = f"there is no file {Path(str(geometry.file)).absolute()}: give its path from the working folder"
             raise ConfigError(f"{place}: geometry.file = {geometry.file!r}: {remedy}")
         known.add(geometry.file)
 

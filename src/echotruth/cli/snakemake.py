@@ -9,6 +9,7 @@ from pathlib import Path
 
 import yaml
 
+from echotruth.cli.command import did_you_mean
 from echotruth.config import shipped
 from echotruth.extras import installation
 
@@ -94,7 +95,8 @@ def option_errors(options: list[str]) -> list[str]:
         if flag in NUMBER_OPTIONS and value != NUMBER_OPTIONS[flag] and not (value.isdigit() and int(value) > 0):
             remedy = f"give a whole number above 0, or {NUMBER_OPTIONS[flag]}"
         elif flag in PROFILE_OPTIONS and not _is_profile(value):
-            remedy = f"is not a profile: give {' or '.join(PROFILES)}, or a folder that holds a config.yaml"
+            meant = f" ({close})" if (close := did_you_mean(value, PROFILES)) else ""
+            remedy = f"is not a profile{meant}: give {' or '.join(PROFILES)}, or a folder that holds a config.yaml"
         else:
             continue
         if value.endswith((".yaml", ".yml")):
@@ -104,8 +106,12 @@ def option_errors(options: list[str]) -> list[str]:
 
 
 def _is_profile(name: str) -> bool:
-    """Whether a name may be that of a profile: Snakemake would read the configuration of a heart as one."""
-    return not Path(name).is_file() or Path(name).name.startswith(("config", "profile"))
+    """Whether a name is that of a profile: Snakemake would read the configuration of a heart as one."""
+    if Path(name).is_file():
+        return Path(name).name.startswith(("config", "profile"))
+    places = os.environ.get("XDG_CONFIG_HOME", "~/.config"), os.environ.get("XDG_CONFIG_DIRS", "/etc/xdg").split(":")[0]
+    folders = [Path(), FOLDER, *(Path(place, "snakemake").expanduser() for place in places)]
+    return name == "none" or any((folder / name).exists() for folder in folders)
 
 
 def executor_error(options: list[str]) -> str | None:

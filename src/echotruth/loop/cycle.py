@@ -218,8 +218,8 @@ def _read_recording(loop: Loop) -> Recording:
     path = path if path.is_file() else Path(loop.file)
     if not path.is_file():
         shipped = ", ".join(sorted(file.stem for file in SHIPPED.glob("*.csv")))
-        remedy = f"give the path of a CSV file or the name of a shipped loop ({shipped})"
-        raise LoopError(f"{path}: there is no readable loop of this name; {remedy}.")
+        remedy = f"give the path of a CSV file from the working folder, or the name of a shipped loop ({shipped})"
+        raise LoopError(f"{path}: there is no file {path.absolute()}; {remedy}.")
     state = path.stat()
     return _checked(path, loop.prescribed, (str(path.resolve()), state.st_ino, state.st_mtime_ns, state.st_size))
 

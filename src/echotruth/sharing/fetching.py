@@ -179,8 +179,12 @@ class _Release:
             problem = said if "hash" in str(error) else f"cannot be had ({_line(error)}): {REMEDY}"
             raise FetchError(f"{address}: {problem}") from None
         except OSError as error:
+            from requests.exceptions import ConnectionError as NoConnection  # by which pooch downloads
+
+            offline = "no connection: see that you are online and the address is right"
+            said = offline if isinstance(error, NoConnection) else _line(error)
             remedy = "what was fetched stays, and the same call goes on"
-            raise FetchError(f"{address}: cannot be had ({_line(error)}): {remedy}") from None
+            raise FetchError(f"{address}: cannot be had ({said}): {remedy}") from None
 
 
 def _lines(note: Path) -> list[str]:

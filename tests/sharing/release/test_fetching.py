@@ -325,3 +325,5 @@ def test_address_at_which_nothing_is_is_told_in_one_sentence(server, tmp_path, m
         with pytest.raises(FetchError) as told:
             et.fetch(source, to=tmp_path / "here")
         assert f"{source}/{REGISTRY}: " in str(told.value) and "\n" not in str(told.value)
+        is_asked = str(source).endswith(":9")
+        assert ("cannot be had (no connection: see that you are online" in str(told.value)) == is_asked

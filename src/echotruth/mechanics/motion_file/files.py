@@ -39,8 +39,8 @@ def series_files(path: str) -> list[Path]:
         return [Path(path)]
     files = sorted((Path(file) for file in glob.glob(path) if Path(file).is_file()), key=natural_order)
     if not files:
-        remedy = "give its path, or a pattern such as heart_*.vtu, relative to the working directory"
-        raise MotionError(f"motion.file.path = {path!r}: there is no such file: {remedy}.")
+        remedy = "give its path, or a pattern such as heart_*.vtu, from the working folder"
+        raise MotionError(f"motion.file.path = {path!r}: there is no file {Path(path).absolute()}: {remedy}.")
     return files
 
 

@@ -134,6 +134,9 @@ class Export:
             if given and not FORMATS[self.format].takes(name):
                 able = ", ".join(key for key, form in FORMATS.items() if form.takes(name))
                 raise ExportError(f"--{name.removesuffix('s')} does nothing for {self.format}: it is for {able}")
+        if self.repository.is_sample and "rf" in FORMATS[self.format].stages:
+            remedy = "echotruth run sample makes it in out/sample (rf.keep in a configuration keeps channels too)"
+            raise ExportError(f"{shipped.SAMPLE}: comes without RF, which {self.format} needs: {remedy}")
         if self.rate is not None and not 0.1 <= self.rate <= 1000:
             raise ExportError(f"--rate {self.rate:g}: give 0.1 to 1000 frames per second")
         if unknown := [name for name in self.overlay if name not in OVERLAYS]:
