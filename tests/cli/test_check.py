@@ -6,6 +6,7 @@ import pyvista
 import yaml
 
 from echotruth.config import Geometry
+from echotruth.loop.cycle import SHIPPED
 from echotruth.mechanics.geometry import left_ventricle
 
 FEW = {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1}
@@ -43,6 +44,32 @@ def test_mesh_that_is_no_heart(check, heart):
     status, output = check(geometry={"file": "heart.vtu", "unit": "mm"} | FEW)
     assert status == 1 and "valid" not in output and "echotruth: mine.yaml: heart.vtu: " in output
     assert "Traceback" not in output
+
+
+@pytest.mark.parametrize(
+    ("loop", "key"), [({"file": "mL.csv"}, "file = 'mL.csv'"), ({"edv_uL": 5e4}, "edv_uL = 50000")]
+)
+def test_volumes_of_another_unit_than_the_heart_are_told(check, tmp_path, loop, key):
+    (tmp_path / "mL.csv").write_text((SHIPPED / "mouse.csv").read_text().replace("volume_uL", "volume_mL"))
+    status, output = check(loop=loop)
+    told = f"loop: {key}: the heart fills to 50,000 uL, and its cavity in the section geometry holds 32.8 uL: mend"
+    assert status == 1 and output.startswith(f"echotruth: mine.yaml: {told}") and output.count("\n") == 1
+
+
+def test_mesh_of_another_unit_than_the_loop_is_told(check, heart):
+    save(*heart, "heart.vtu")
+    status, output = check(geometry={"file": "heart.vtu", "unit": "cm", "remesh": True} | FEW)
+    assert status == 1 and "fills to 50 uL, and its cavity in heart.vtu with geometry.unit = cm holds 3" in output
+
+
+@pytest.mark.parametrize(("geometry", "loop"), [
+    ({"dilation": 2.0}, {"kind": "circulation"}),
+    ({"preset": "human", "dilation": 1.4}, {"edv_uL": 300_000, "esv_uL": 240_000}),
+    ({"preset": "human", "scale": 0.3}, {}),
+    ({"preset": "rat"}, {"edv_uL": 450, "esv_uL": 300}),
+])  # fmt: skip
+def test_unusual_hearts_are_valid(check, geometry, loop):
+    assert check(geometry=geometry, loop=loop)[0] == 0
 
 
 def test_surface_with_a_hole(check):

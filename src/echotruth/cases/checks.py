@@ -152,15 +152,15 @@ def _distinct(hearts: list[tuple[Combination, Case]], name: str, source: str) ->
 
 
 def _check_loops(hearts: list[tuple[Combination, Case]], source: str) -> None:
-    """Check each loop once; where one of its volumes is given, for each size of heart that sets the other."""
+    """Check each loop once for each size of heart."""
     from echotruth.loop.calibration import closed_valves
-    from echotruth.loop.cycle import LoopError, check_loop, read_loop, size
+    from echotruth.loop.cycle import LoopError, check_filling, check_loop, read_loop, size
 
-    known: set[tuple[str, float]] = set()
+    known: set[tuple[str, float, float]] = set()
     for heart, case in hearts:
-        loop = case.config.loop
-        factor = size(case.config) if (loop.edv_uL is None) != (loop.esv_uL is None) else 1.0
-        found = loop.model_dump_json(exclude={"circulation"}), factor
+        loop, geometry = case.config.loop, case.config.geometry
+        factor = size(case.config)
+        found = loop.model_dump_json(exclude={"circulation"}), factor, geometry.cavity_uL()
         if found in known:
             continue
         known.add(found)
@@ -169,10 +169,12 @@ def _check_loops(hearts: list[tuple[Combination, Case]], source: str) -> None:
                 closed_valves(read_loop(loop, factor))
             else:
                 check_loop(loop, factor)
+            if case.config.motion.kind == "beat" and not geometry.file:
+                check_filling(case.config, geometry.cavity_uL() * 1e-9)
         except LoopError as error:
             is_swept = heart.origin and any(key.startswith(("loop.", "geometry.")) for key in heart.parameters)
             place = f"{source}: {heart.origin}" if is_swept else source
-            raise ConfigError(f"{place}: loop: {error}") from None
+            raise ConfigError(f"{place}: loop: {str(error).removeprefix('loop.')}") from None
 
 
 def _check_series(path: str | None, place: str) -> None:

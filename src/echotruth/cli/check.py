@@ -105,12 +105,19 @@ def _of_files(cases: list[Case]) -> Iterator[str]:
             first.setdefault((case.config.geometry.file, path), case)
     if not first:
         return
+    from echotruth.loop.recording import LoopError
+    from echotruth.mechanics.beat import fillable_ventricle
     from echotruth.mechanics.geometry import GeometryError, left_ventricle
     from echotruth.mechanics.motion_file.wall import moving_wall
     from echotruth.mechanics.prescribed import MotionError
 
     for (_, path), case in first.items():
         try:
-            moving_wall(case.config) if path else left_ventricle(case.config.geometry)
-        except (GeometryError, MotionError) as error:
+            if path:
+                moving_wall(case.config)
+            elif case.config.motion.kind == "beat":
+                fillable_ventricle(case.config)
+            else:
+                left_ventricle(case.config.geometry)
+        except (GeometryError, LoopError, MotionError) as error:
             yield str(error)

@@ -59,7 +59,7 @@ class Loop(Section):
     the file has none (the pressure is solved); or `pressure` with active tension (the volume is solved, and is not
     unique during ejection)."""
     file: str = "mouse"
-    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for `prescribed: volume`) or the path, from the working folder,
+    """A shipped cycle (`mouse`, `rat`, `human`; `twitch` for `prescribed: volume`), or the path from the working folder
     of a CSV file with columns of time and of the prescribed quantities, each named with its unit: time_ms or _s;
     pressure_mmHg, _kPa or _Pa; volume_uL, _mL or _m3; tension_kPa or _Pa. `LVP [mmHg]` and the like are read too,
     semicolons, tabs, decimal commas, and what LabChart exports as text."""

@@ -33,6 +33,9 @@ _CURVES = ("pressure", "volume", "tension")
 
 _MAX_GAP = 0.03
 """Largest difference of the last row from the first, over the range: noise keeps a measured loop from closing."""
+_MAX_FILLING = 4.0
+"""Largest factor between end-diastolic volume and unloaded cavity: it is 1.7 to 2.1 for pressures up to 20 mmHg (Klotz
+et al., Am J Physiol Heart Circ Physiol 291 (2006) H403), and 10 or more where a unit is wrong."""
 _MIN_FIRST_VOLUME = 0.95
 """Smallest volume of the first row, on a scale from 0 (smallest) to 1 (largest)."""
 _MAX_FIRST_TENSION = 0.05
@@ -159,6 +162,33 @@ def check_loop(loop: Loop, size: float = 1.0) -> None:
         If the file cannot be read or holds no valid cycle.
     """
     recorded_curves(loop, size)
+
+
+def check_filling(config: Config, cavity: float) -> None:
+    """Refuse volumes that the heart cannot have, as those in another unit.
+
+    Parameters
+    ----------
+    config : Config
+    cavity : float
+        Volume of the cavity of the given geometry, m^3.
+
+    Raises
+    ------
+    LoopError
+        If its end-diastolic volume is far from that of the loop.
+    """
+    loop, volume = config.loop, recorded_curves(config.loop, size(config))["volume"]
+    healthy = cavity / config.geometry.dilation**3 if loop.kind == "circulation" else cavity
+    if volume is None or 1 / _MAX_FILLING <= volume[0] / healthy <= _MAX_FILLING:
+        return
+    key = f"file = {loop.file!r}" if loop.edv_uL is None else f"edv_uL = {loop.edv_uL:g}"
+    filled, empty = (f"{float(f'{amount * 1e9:.3g}'):,g} uL" for amount in (volume[0], healthy))
+    geometry = config.geometry
+    place = f"in {geometry.file} with geometry.unit = {geometry.unit}" if geometry.file else "in the section geometry"
+    volumes = f"the heart fills to {filled}, and its cavity {place} holds {empty}"
+    remedy = f"mend the unit of the one or of the other, so that they are within a factor of {_MAX_FILLING:g}"
+    raise LoopError(f"loop.{key}: {volumes}: {remedy}.")
 
 
 def frame_times(loop: Loop) -> Floats:

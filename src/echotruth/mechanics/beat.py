@@ -9,11 +9,12 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config import Config, Pathology
 from echotruth.config.cases import HEARTS
+from echotruth.fem.tetrahedra import Mesh
 from echotruth.fem.volume import cell_volumes
 from echotruth.loop import phases
 from echotruth.loop.calibration import calibrate
 from echotruth.loop.circulation import altered
-from echotruth.loop.cycle import Cycle, heart_cycle
+from echotruth.loop.cycle import Cycle, check_filling, heart_cycle
 from echotruth.loop.recording import LoopError
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.hold import held
@@ -21,6 +22,7 @@ from echotruth.mechanics.outputs import Arrays, collect_outputs
 from echotruth.mechanics.pathology import BORDER, INFARCT, PathologyError, healthy_heart, thinned
 from echotruth.mechanics.prescribed import prescribed_motion
 from echotruth.mechanics.solver.activation import Activation
+from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.mechanics.solver.circulation import guessed, steady_beat
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
 from echotruth.mechanics.solver.element import fibre_stretch
@@ -102,13 +104,20 @@ def simulate(config: Config) -> dict[str, Arrays]:
 
 def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     """The unloaded wall of a configuration, solved for where its geometry is that of end-diastole."""
-    mesh = thinned(left_ventricle(config.geometry), config.pathology.infarct)
+    mesh = thinned(fillable_ventricle(config), config.pathology.infarct)
     logger.info("%d tetrahedra, %d nodes", len(mesh.cells), len(mesh.nodes))
     if config.geometry.given_state == "end_diastole":
         assert cycle.pressure is not None
         stiffness = config.mechanics.material.si().stiffness
         mesh = unload(mesh, lambda guess: equilibrium(config, wall(config, guess)), cycle.pressure[0], stiffness)
     return wall(config, mesh)
+
+
+def fillable_ventricle(config: Config) -> Mesh:
+    """Left ventricle of a configuration; LoopError if its loop is that of a heart of another size."""
+    mesh = left_ventricle(config.geometry)
+    check_filling(config, cavity_volume(mesh.nodes, mesh.endo))
+    return mesh
 
 
 def check_frames(config: Config, frames: Sequence[int]) -> None:
