@@ -6,13 +6,14 @@ the folder of the repository, and over no file but those of which a note says th
 """
 
 import csv
+import re
 import shutil
 from errno import EEXIST
 from hashlib import sha256
 from io import StringIO
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile, ZipFile
+from zipfile import ZipFile
 
 from echotruth.repository.choice import Names, chosen
 from echotruth.repository.reader import Repository
@@ -24,8 +25,8 @@ STRUCTURE, HEARTS = "structure", "hearts"
 """What the parts hold that make up the repository."""
 UNPACKED = ".unpacked"
 """Suffix of the note of a part: a line for each file that is unpacked of it, and one of its checksum once all are."""
-
-
+CHECKSUM = re.compile("sha256:[0-9a-f]{64}")
+"""What a registry has of each file."""
 REMEDY = "give the folder or address of a release"
 
 
@@ -109,13 +110,19 @@ class _Release:
             path.write_bytes(known)
         try:
             self.pooch.load_registry(path)
-        except (OSError, UnicodeDecodeError):
+            if not all(CHECKSUM.fullmatch(known) for name, known in self.pooch.registry.items() if name != REGISTRY):
+                raise ValueError
+        except (OSError, ValueError):
             path.unlink()
             raise FetchError(f"{self.source}/{REGISTRY}: is not the registry of a release: {REMEDY}") from None
 
     def parts(self) -> list[dict[str, str]]:
         """Table of the parts: part, what it holds, case."""
-        rows = list(csv.DictReader(StringIO(self._file(PARTS).read_text(encoding="utf-8", errors="replace"))))
+        text = self._file(PARTS).read_text(encoding="utf-8", errors="replace")
+        try:
+            rows = list(csv.DictReader(StringIO(text)))
+        except csv.Error:
+            rows = []
         if not rows or not {"part", "holds", "case"} <= rows[0].keys():
             raise FetchError(f"{self.source}/{PARTS}: is not the table of a release: {REMEDY}")
         return [{name: row[name] or "" for name in ("part", "holds", "case")} for row in rows]
@@ -149,13 +156,14 @@ class _Release:
         except FileExistsError as error:
             remedy = "remove it, or give another folder"
             raise FetchError(f"{error.filename}: is there, and this release did not write it: {remedy}") from None
-        except (BadZipFile, ValueError, RuntimeError) as error:  # what ZipFile raises of archives made otherwise
-            raise FetchError(f"{self.source}/{part}: is not a part of a release ({_line(error)}): {REMEDY}") from None
         except OSError as error:
             remedy = "it must be a folder that you may write to, with space; the same call goes on"
             raise FetchError(
                 f"{self.folder}: {part} cannot be unpacked ({error.strerror or error}): {remedy}"
             ) from None
+        except Exception as error:  # ZipFile has no common type for what is wrong with an archive
+            problem = _line(error) or "it is cut off"
+            raise FetchError(f"{self.source}/{part}: is not a part of a release ({problem}): {REMEDY}") from None
         _add(note, [str(checksum)])
         path.unlink()
 

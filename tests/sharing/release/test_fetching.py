@@ -9,6 +9,7 @@ from io import BytesIO
 from pathlib import Path
 from shutil import copytree
 from stat import S_IFCHR, S_IFIFO, S_IFLNK
+from struct import pack
 from zipfile import ZipFile, ZipInfo
 
 import pytest
@@ -204,6 +205,8 @@ def archived(*files: tuple[str, str | bytes, int]) -> bytes:
 
 
 WHOLE = ("sample/config.yaml", "name: sample", 0o644)
+CUT_OFF = archived(WHOLE).replace(pack("<II", 12, 12), pack("<II", 2**20, 2**20))
+"""Archive whose file is said to be longer than all of it."""
 
 
 @pytest.mark.parametrize(
@@ -304,12 +307,16 @@ def test_part_does_not_pass_for_the_note_of_what_was_written(released, tmp_path)
     [
         (REGISTRY, b"\xff\xfe\x00", "registry.txt: is not the registry of a release"),
         (REGISTRY, b"one two three four\n", "registry.txt: is not the registry of a release"),
+        (REGISTRY, b"parts.csv shake_128:00\n", "registry.txt: is not the registry of a release"),
+        (REGISTRY, b"parts.csv 'one\n", "registry.txt: is not the registry of a release"),
         (REGISTRY, b"", "has no file 'parts.csv': the release is not whole"),
         (PARTS, b"a,b\n1,2\n", "parts.csv: is not the table of a release"),
         (PARTS, b"", "parts.csv: is not the table of a release"),
+        (PARTS, b"part,holds,case\n" + b"x" * 200_000, "parts.csv: is not the table of a release"),
         (PARTS, b"part,holds,case\nsample-hearts-0001.zip,hearts,healthy\n", "its parts hold no repository"),
         ("sample-structure.zip", archived(("sample/x", "x", 0o644)), "its parts hold no repository"),
-        ("sample-structure.zip", b"no archive", "is not a part of a release"),
+        ("sample-structure.zip", b"no archive", "is not a part of a release (File is not a zip file)"),
+        ("sample-structure.zip", CUT_OFF, "is not a part of a release (it is cut off)"),
     ],
 )
 def test_what_is_no_release_is_refused_in_one_sentence(released, tmp_path, name, content, sentence):
