@@ -126,9 +126,9 @@ def places(number, columns=1, rows=1):
     return (points + 0.5) * [columns, rows] - 0.5, half
 
 
-def run(model, frames, points):
+def run(model, frames, points, **keys):
     given = (frames, points, np.ones(frames.shape[1:], bool), 2e-5, np.arange(len(frames)) * 1e-3, 1)
-    return track(*given, Onnx(model=str(model)))
+    return track(*given, Onnx(model=str(model), **keys))
 
 
 MYOTRACKER = dict(frames="1T1HW", points="1N2", tracks="1TN2", coordinates="row_column")
@@ -330,6 +330,21 @@ def test_failure_within_the_model_is_told(tmp_path):
         run(tmp_path / "a.onnx", flash(), POINTS)
 
 
+def test_model_without_an_end_is_ended_after_its_time(tmp_path):
+    """A loop that adds 1 to the points as long as a condition holds, which always does."""
+    kinds = {"step": (TensorProto.INT64, []), "goes": (TensorProto.BOOL, []), "sum": (FLOAT, None)}
+    inputs = [helper.make_tensor_value_info(name, *kind) for name, kind in kinds.items()]
+    outputs = [helper.make_tensor_value_info(f"{name}_on", *kinds[name]) for name in ("goes", "sum")]
+    one = numpy_helper.from_array(np.float32(1), "one")
+    nodes = [helper.make_node("Identity", ["goes"], ["goes_on"]), helper.make_node("Add", ["sum", "one"], ["sum_on"])]
+    graph = Graph()
+    found = graph("Loop", "", np.array(True), "p", body=helper.make_graph(nodes, "body", inputs, outputs, [one]))
+    model = tmp_path / "a.onnx"
+    graph.save(model, {"f": (FLOAT, ["T", 9, 9]), "p": (FLOAT, ["N", 2])}, {"tracks": (found, 2)})
+    with pytest.raises(TrackerFailed, match=r"a\.onnx: took longer than timeout_s = 0\.5$"):
+        run(model, flash(), POINTS, timeout_s=0.5)
+
+
 @pytest.fixture
 def command(tmp_path, monkeypatch, capsys):
     """Function that runs the command line in an empty folder, and returns its status and what it said."""
@@ -358,6 +373,8 @@ def test_command_scores_a_model_under_its_name_and_says_in_one_line_why_it_canno
     assert status == 0 and (tmp_path / "hearts/external/my_net.csv").is_file(), said
     status, said = command(*chosen, "--option", "window=3")
     assert status == 2 and "window is not a key of the method onnx" in said
+    status, said = command(*chosen, "--timeout", "0")
+    assert status == 2 and "timeout_s = 0.0: should be greater than 0" in said
     declare(tmp_path / "my-net.onnx", values=[1])
     status, said = command(*chosen)
     assert status == 2 and said.startswith("echotruth: my-net.yaml: values = [1]: ") and said.count("\n") == 1

@@ -264,6 +264,8 @@ class Onnx(Section):
     model: Annotated[str, Field(min_length=1)]
     """File of the model. What its graph does not tell is declared in a file beside it of the same name with the ending
     .yaml (docs/trackers.md)."""
+    timeout_s: Positive = 3600.0
+    """Longest time that the model may take for one clip."""
 
     @property
     def files(self) -> list[str]:

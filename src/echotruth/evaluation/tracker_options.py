@@ -34,14 +34,17 @@ def parse_tracker(
     options : list of str
         As `key=value`, the value in YAML.
     timeout : float, optional
-        Longest time that the program may take for a clip, s.
+        Longest time that the program or model may take for a clip, s.
 
     Raises
     ------
     EvaluationError
-        If an option or the command cannot be read, or a timeout is given for something other than a program.
+        If an option or the command cannot be read, or a timeout is given for a method or a callable.
     """
     pairs = dict(map(_option, options))
+    limit = {} if timeout is None else {"timeout_s": timeout}
+    if tracker is not None and tracker.endswith(".onnx"):
+        return _identifier(Path(tracker).stem), {"method": "onnx", "model": tracker, **pairs, **limit}
     if tracker is not None and timeout is not None:
         remedy = "leave it out, or give a program as --command"
         raise EvaluationError(f"--timeout {timeout:g}: {tracker} is not timed: {remedy}")
@@ -50,11 +53,8 @@ def parse_tracker(
             words = split(command or "")
         except ValueError as error:
             raise EvaluationError(f"--command {command}: {str(error).lower()}: fix the quotes") from None
-        limit = {} if timeout is None else {"timeout_s": timeout}
         script = next((word for word in words if Path(word).suffix.lower() in SCRIPTS), (words or [""])[0])
         return _identifier(Path(script).stem), {"method": "external", "command": words, "options": pairs, **limit}
-    if tracker.endswith(".onnx"):
-        return _identifier(Path(tracker).stem), {"method": "onnx", "model": tracker, **pairs}
     if tracker in BUILTIN:
         return tracker, {"method": tracker, **pairs}
     return _identifier(tracker.removesuffix(":track")), {"method": "external", "track": tracker, "options": pairs}

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from threading import TIMEOUT_MAX, Timer
 from typing import Any, get_args
 
 import numpy as np
@@ -34,9 +35,14 @@ def track(clip: TrackerInput, settings: Onnx) -> tuple[Floats, Floats]:
     points = np.clip((np.nan_to_num(clip.points) + 0.5) * scale - 0.5, 0, side - 1)
     moved, seen = np.zeros((len(video), *points.shape)), np.ones((len(video), len(points)))
     size = model.sizes.get("N", len(points)) or 1
-    for first in range(0, len(points), size):
-        group = np.minimum(np.arange(first, first + size), len(points) - 1)  # the last one again if too few are left
-        moved[:, group], seen[:, group] = _followed(model, video, points[group])
+    timer = Timer(min(settings.timeout_s, TIMEOUT_MAX), setattr, (model.run_options, "terminate", True))
+    timer.start()
+    try:
+        for first in range(0, len(points), size):
+            group = np.minimum(np.arange(first, first + size), len(points) - 1)  # the last one again if few are left
+            moved[:, group], seen[:, group] = _followed(model, video, points[group])
+    finally:
+        timer.cancel()
     return moved / scale, seen
 
 
@@ -61,7 +67,8 @@ class Model:
 
     def __init__(self, settings: Onnx) -> None:
         self.path, self.beside, _ = map(Path, settings.files)
-        self.session = _session(self.path)
+        self.session, self.run_options = _session(self.path)
+        self.timeout_s = settings.timeout_s
         declared = read_yaml(self.beside) if self.beside.is_file() else {}
         self.signature = checked(declared, str(self.beside), OnnxSignature)
         by_name = {node.name: node for node in sorted(self.session.get_inputs(), key=lambda node: -len(node.shape))}
@@ -116,9 +123,10 @@ class Model:
         arrays = {"frames": (video, self.layouts["frames"]), "points": (places, self.layouts["points"][:-1])}
         try:
             given = {node.name: _given(node, *arrays[key]) for key, node in self.inputs.items()}
-            found = [np.asarray(array, float) for array in self.session.run(self.outputs, given)]
+            found = [np.asarray(array, float) for array in self.session.run(self.outputs, given, self.run_options)]
         except Exception as error:  # ONNX Runtime raises many kinds
-            raise TrackerFailed(f"{self.path}: failed on a call: {in_one_line(str(error))}") from error
+            late = f"took longer than timeout_s = {self.timeout_s:g}" if self.run_options.terminate else ""
+            raise TrackerFailed(f"{self.path}: {late or f'failed on a call: {in_one_line(str(error))}'}") from error
         for name, array in zip(self.outputs, found, strict=True):
             if lost := int(np.sum(~np.isfinite(array))):
                 raise TrackerFailed(f"{self.path}: {lost} of the {array.size} numbers of {name} are not finite")
@@ -143,8 +151,8 @@ class Model:
         raise TrackerFailed(f"{self.beside}: {given}: {told}{call}: give the one of {', '.join(usual)} that fits")
 
 
-def _session(path: Path) -> Any:
-    """Session on one core, because sums of several threads may differ in their last digits."""
+def _session(path: Path) -> tuple[Any, Any]:
+    """Session on one core, because sums of several threads may differ in last digits, and options of its calls."""
     if not path.is_file():
         raise TrackerFailed(f"{path}: is not there: give the path of a model in ONNX")
     try:
@@ -156,9 +164,10 @@ def _session(path: Path) -> Any:
     options.use_deterministic_compute = True
     options.log_severity_level = 4  # errors are raised, and told once
     try:
-        return onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+        session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime raises many kinds
         raise TrackerFailed(f"{path}: is no model that ONNX Runtime can load: {in_one_line(str(error))}") from error
+    return session, onnxruntime.RunOptions()
 
 
 def _given(node: Any, array: Floats, layout: str) -> np.ndarray:
