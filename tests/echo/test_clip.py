@@ -401,3 +401,16 @@ def test_video_with_an_odd_frame_size_is_read(tmp_path):
         writer.send(frame)
     writer.close()
     assert et.read_clip(tmp_path / "a.avi", **GIVEN)["image"].shape == FILM.shape
+
+
+def test_hidden_files_of_a_folder_are_no_frames_and_an_image_beside_the_series_is_named(tmp_path):
+    folder = frames_as(tmp_path / "a", FILM)
+    (folder / "._00.png").write_bytes(b"\0\5\x16\7")  # what macOS leaves on other disks
+    np.testing.assert_array_equal(et.read_clip(folder, **GIVEN)["image"], FILM)
+    Image.fromarray(FILM[0]).save(folder / "thumbnail.png")
+    with pytest.raises(
+        EchoError, match=r"thumbnail.png: is not numbered as the 6 images #: move it elsewhere, or name"
+    ):
+        et.read_clip(folder, **GIVEN)
+    named = frames_as(tmp_path / "b", FILM[:3], names=["before", "during", "then"])
+    assert len(et.read_clip(named, **GIVEN)["image"]) == 3

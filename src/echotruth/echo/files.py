@@ -1,7 +1,9 @@
 """Recorded clips in files of other kinds than DICOM: video, animation, images, NIfTI, NumPy."""
 
 import os
+import re
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -52,11 +54,23 @@ def _folder(path: Path) -> Recording:
     from echotruth.mechanics.motion_file.files import natural_order
 
     images = (file for file in path.iterdir() if file.suffix.lower() in IMAGES and file.is_file())
-    files = sorted(images, key=natural_order)
+    files = sorted((file for file in images if not file.name.startswith(".")), key=natural_order)
+    _check_series(files)
     frames = [(file, page) for file in files for page in _pages(file)]
     if not frames:
         raise EchoError(f"{path}: has no images: a clip needs {FEWEST_FRAMES} or more ({', '.join(IMAGES)})")
     return _clip(frames, path)
+
+
+def _check_series(files: list[Path]) -> None:
+    """Raise an :class:`EchoError` that names an image whose name is like none of those that are numbered alike."""
+    kinds = [re.sub(r"\d+", "#", file.stem) for file in files]
+    series, count = max(Counter(kinds).items(), key=lambda kind: kind[1], default=("", 0))
+    odd = [file for file, kind in zip(files, kinds, strict=True) if kinds.count(kind) == 1]
+    if "#" in series and count >= FEWEST_FRAMES and odd:
+        raise EchoError(
+            f"{odd[0]}: is not numbered as the {count} images {series}: move it elsewhere, or name it alike"
+        )
 
 
 def _animation(path: Path) -> Recording:
