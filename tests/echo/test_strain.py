@@ -12,6 +12,7 @@ from PIL import Image
 import echotruth as et
 from echotruth.cli import main
 from echotruth.cli.track import TRACKERS
+from echotruth.echo import page
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import write_wall
 from echotruth.evaluation.tracker_options import BUILTIN
@@ -45,6 +46,7 @@ def test_segments_of_an_even_ring_are_equal(ring, tracked):
     strain = tracked["segment_strain"].sel(measure="engineering", wall_component="TT").isel(frame=FRAMES // 2)
     seen = strain.dropna("aha")
     assert seen["aha"].values.tolist() == [7, 8, 9, 10, 11, 12]
+    assert page.curves(tracked)["segment_7_mid_anterior_percent"].min() == pytest.approx(100 * float(seen[0]), abs=0.5)
     assert float(seen.max() - seen.min()) < 0.02
     assert float(seen.mean()) == pytest.approx(ring.line(MIDDLE)[FRAMES // 2], abs=0.015)
 
@@ -73,7 +75,10 @@ def test_any_tracker_will_do(ring):
 
 def test_clip_that_begins_elsewhere_and_does_not_close_is_told(ring):
     strain = et.speckle_tracking(clip_of(ring, slice(4, FRAMES)), ring.wall(), "dis")
-    first, second = strain.attrs["notes"].splitlines()
+    few, first, second = strain.attrs["notes"].splitlines()
+    assert few == (
+        "the cycle has only 6 frames, so that 7 % of the strain may be missed between two: record 10 or more"
+    )
     assert "the cavity is largest in frame 5" in first and "begin the cycle at end-diastole" in first
     assert "is left in the last frame" in second
 

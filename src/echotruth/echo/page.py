@@ -8,12 +8,15 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 
+from echotruth.aha import SEGMENT_NAMES
 from echotruth.report import style
 
 COLOURS = tuple(map(to_hex, style.layer_colours(3)))
 """Of the endocardial, middle and epicardial line."""
 DOUBT = "#b3261e"
 """Of what is said of a doubtful strain."""
+QUALITY = "0 to 1: how probably a point is right within 1/256 of the side of the image"
+"""What the quality is."""
 
 
 def headline(strain: xr.Dataset) -> str:
@@ -41,8 +44,8 @@ def curves(strain: xr.Dataset) -> pd.DataFrame:
     DataFrame
         A row per frame: `time_ms`; the global strain of the three lines, `gcs_endocardial_percent` and so on, `gls_` in
         a long axis; the mean `radial_strain_percent` of the wall; `rotation_deg` in a short axis; `cavity_area_mm2`;
-        and `segment_7_percent` and so on, the circumferential or longitudinal strain of the AHA segments that are seen.
-        Strains are engineering strains.
+        and `segment_7_mid_anterior_percent` and so on, the circumferential or longitudinal strain of the AHA segments
+        that are seen. Strains are engineering strains.
     """
     name = global_strain(strain)[0].lower()
     engineering = strain.sel(measure="engineering")
@@ -55,7 +58,8 @@ def curves(strain: xr.Dataset) -> pd.DataFrame:
     columns["cavity_area_mm2"] = 1e6 * strain["cavity_area"].values
     for number, values in zip(strain["aha"].values, engineering["segment_strain"].values[..., 1].T, strict=True):
         if np.isfinite(values).any():
-            columns[f"segment_{number}_percent"] = 100 * values
+            name = SEGMENT_NAMES[number - 1].replace(" ", "_")
+            columns[f"segment_{number}_{name}_percent"] = 100 * values
     return pd.DataFrame(columns)
 
 
@@ -121,12 +125,12 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
 
 
 def _title(strain: xr.Dataset) -> str:
-    """One line: the clip, its global strain, and how far to trust it."""
+    """The clip and its global strain, and on a second line how far to trust it."""
     row = summary(strain)
     where = f"at end-systole, {row['end_systole_ms']:.0f} ms"
     first = f"{Path(str(row['source'])).name}, {row['view']}: {headline(strain)} {where}"
-    rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {row['quality']:.2f}"
-    return f"{first}; {row['tracker']}, {rest}"
+    rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {row['quality']:.2f} ({QUALITY})"
+    return f"{first}\n{row['tracker']}, {rest}"
 
 
 def _image(axis: Axes, clip: xr.Dataset, strain: xr.Dataset, frame: int, title: str) -> None:

@@ -11,16 +11,17 @@ from echotruth.arrays import Floats
 from echotruth.config.building import configure, tracker_section
 from echotruth.config.defaults import REFERENCE_FIELD_OF_VIEW_MM
 from echotruth.config.tracking import Tracking
+from echotruth.echo.doubts import doubts, rms_length
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import LAYERS, Wall
 from echotruth.echo.wall_file import part
-from echotruth.evaluation import statistics
 from echotruth.evaluation.contours import Contours
 from echotruth.evaluation.courses import motion_courses, strain_courses
 from echotruth.evaluation.displacement_error import WallPoints
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.repository.schema import LABELS
-from echotruth.tracking.plausibility import REFERENCE_WALL_MM, doubts
+from echotruth.tracking import plausibility
+from echotruth.tracking.plausibility import REFERENCE_WALL_MM
 from echotruth.tracking.tracker import track
 
 GRID_PX, IMAGE_PX = Tracking.model_fields["grid_px"].default, 512
@@ -30,18 +31,6 @@ MIN_WALL_PX = 6.0
 """Thickness of the wall below which nothing can be told of its strain, px."""
 WALLS_MM = 0.5, 50.0
 """Thickness of the thinnest and of the thickest wall that is tracked: beyond, the side of a pixel is wrong."""
-
-LARGEST_FIRST, LARGEST_DRIFT, LEAST_COVERAGE = 1.1, 20.0, 90.0
-"""Largest cavity of the cycle over that of the first frame; drift, %; and share of points with an estimate at
-end-systole, %: beyond these a note says so. An infarct that bulges before the valve opens makes a cavity 1.08 times as
-large, in truth, in the short axis of the sample."""
-
-REFERENCE_CYCLE = 0.12
-"""Duration of a cycle of the heart with the wall `REFERENCE_WALL_MM`, s."""
-LARGEST_DEPARTURE = 4.0
-"""Thickness of the wall over that which suits the duration of the cycle, or the inverse, beyond which a note says so.
-In mammals the heart's lengths go with the cube root of the body's mass, the duration of a cycle with the fourth root
-(Dawson 2014, Systems 2:168, doi 10.3390/systems2020168), thus the thickness with the duration to the power of 4/3."""
 
 Tracker = str | Callable[..., Any]
 
@@ -121,15 +110,16 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     curves["cavity_area"] = _area(place[:, lines.contour == 0])
     values = {"displacement": moved, "quality": quality, "strain": strain, "line_position": place} | curves
     data = _dataset(values, position, tissue, clip)
-    told = [*doubts(frames, mask, spacing, settings), *_size(wall.thickness() * spacing, clip["time"].values)]
     data["line_contour"] = ("line_point", lines.contour, {"long_name": "index of the contour of a point of a line"})
-    return data.assign_attrs(
-        _summary(curves, moved, clip["time"].values, wall, told),
+    data = data.assign_attrs(
+        _summary(curves, moved, clip["time"].values, wall),
         tracker=tracker if isinstance(tracker, str) else getattr(tracker, "__name__", type(tracker).__name__),
         view=wall.view,
         source=clip.attrs.get("source", ""),
         spacing=spacing,
     )
+    told = [*plausibility.doubts(frames, mask, spacing, settings), *doubts(data, wall.thickness() * spacing)]
+    return data.assign_attrs(notes="\n".join(told))
 
 
 def _frames(clip: xr.Dataset) -> tuple[NDArray[np.uint8], float]:
@@ -210,62 +200,23 @@ def _area(line: Floats) -> Floats:
     return area
 
 
-def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall, told: list[str]) -> dict[str, Any]:
-    """End-systole, global strain of the middle line there, drift, and notes, after those that are `told` already."""
-    area = curves["cavity_area"]
+def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall) -> dict[str, Any]:
+    """End-systole, global strain of the middle line there, and drift."""
+    area, length = curves["cavity_area"], rms_length(moved)
     es = int(np.nanargmin(area)) if np.isfinite(area).any() else 0
-    coverage = 100 * float(np.isfinite(moved[es]).all(axis=-1).mean())
-    length, steps = _length(moved), _length(np.diff(moved, axis=0))
     largest = float(np.nanmax(length)) if np.isfinite(length).any() else 0.0
-    drift = 100 * float(length[-1]) / largest if largest > 0 else 0.0
-    # The last frame is one step before the end of the cycle.
-    step = 100 * float(np.nanmax(steps)) / largest if largest > 0 and np.isfinite(steps).any() else 0.0
     name = "gcs_percent" if wall.plane == "short_axis" else "gls_percent"
     return {
         "es_frame": es,
         "end_systole": float(time[es]),
         name: 100 * float(curves["line_strain"][es, 1]),
-        "drift_percent": drift,
-        "notes": "\n".join([*told, *_notes(area, drift, step, coverage)]),
+        "drift_percent": 100 * float(length[-1]) / largest if largest > 0 else 0.0,
     }
-
-
-def _length(vectors: Floats) -> Floats:
-    """RMS length (frame,) of vectors (frame, point, plane)."""
-    return np.sqrt(statistics.mean((vectors**2).sum(-1)[..., None], np.ones((1, vectors.shape[1]), bool))[:, 0, 0])
-
-
-def _notes(area: Floats, drift: float, step: float, coverage: float) -> list[str]:
-    """What should make one doubt: drift and the largest step between frames are %."""
-    notes = []
-    if np.isfinite(area).any() and np.nanmax(area) > LARGEST_FIRST * area[0]:
-        frame, more = int(np.nanargmax(area)), 100 * (np.nanmax(area) / area[0] - 1)
-        notes.append(
-            f"the cavity is largest in frame {frame}, by {more:.0f} % more than in the first: begin the cycle at "
-            "end-diastole"
-        )
-    if not drift <= max(LARGEST_DRIFT, step):
-        notes.append(f"{drift:.0f} % of the largest displacement is left in the last frame: is it one whole cycle?")
-    if coverage < LEAST_COVERAGE:
-        notes.append(f"only {coverage:.0f} % of the points have an estimate at end-systole")
-    return notes
-
-
-def _size(thickness: float, time: Floats) -> list[str]:
-    """What should make one doubt the scale: a wall of a thickness (m) that does not suit the duration of the cycle."""
-    duration = float(time[-1] - time[0]) * len(time) / (len(time) - 1)
-    suited = REFERENCE_WALL_MM * (duration / REFERENCE_CYCLE) ** (4 / 3)
-    if 1 / LARGEST_DEPARTURE <= 1e3 * thickness / suited <= LARGEST_DEPARTURE:
-        return []
-    return [
-        f"a wall {1e3 * thickness:.2g} mm thick does not go with a cycle of {1e3 * duration:.0f} ms, as a heart has "
-        f"whose wall is about {suited:.2g} mm thick: are spacing and frame time right, and is it one cycle?"
-    ]
 
 
 DIMENSIONS = {
     "displacement": ("frame point plane", "m", "displacement since the first frame"),
-    "quality": ("frame point", "1", "probability that the displacement is right, as the tracker sees it"),
+    "quality": ("frame point", "1", "probability, 0 to 1, of an error below 1/256 of the side of the image"),
     "strain": ("frame point wall_component", "1", "Green-Lagrange strain since the first frame"),
     "region_strain": ("frame measure region wall_component", "1", "mean strain of the wall and of its layers"),
     "segment_strain": ("frame measure aha wall_component", "1", "mean strain of AHA segments"),

@@ -1,0 +1,80 @@
+"""What of a tracked ring should make one doubt, and that nothing is said of a ring that is followed."""
+
+import numpy as np
+import pytest
+from contracting_ring import CENTRE, FRAMES, SIDE
+
+import echotruth as et
+
+
+def notes(ring, frames=None, tracker="dis"):
+    clip = et.read_clip(ring.frames if frames is None else frames, spacing_mm=0.04, frame_time_ms=10)
+    return et.speckle_tracking(clip, ring.wall(), tracker).attrs["notes"]
+
+
+def moving(displaced):
+    """Tracker that moves points by a function of their place about the centre, px, once there and back."""
+
+    def track(frames, points, *_):
+        return np.sin(np.pi * np.arange(FRAMES) / FRAMES)[:, None, None] ** 2 * displaced(points - CENTRE)
+
+    return track
+
+
+def evenly(place):
+    return -0.1 * place
+
+
+@pytest.mark.parametrize("smooth", [0, 2])
+def test_noise_is_not_taken_for_motion(ring, smooth):
+    from scipy.ndimage import gaussian_filter
+
+    noise = gaussian_filter(np.random.default_rng(0).normal(size=(FRAMES, SIDE, SIDE)), (0, smooth, smooth))
+    told = notes(ring, np.clip(128 + 45 * noise / noise.std(), 0, 255).astype(np.uint8))
+    assert "the quality at end-systole is 0." in told and "the motion is not found" in told
+    assert "beats" not in told
+
+
+def test_ring_in_noise_that_is_still_followed_is_not_doubted(ring):
+    noise = np.random.default_rng(1).normal(0, 40, ring.frames.shape)
+    assert notes(ring, np.clip(ring.frames + noise, 0, 255).astype(np.uint8)) == ""
+
+
+@pytest.mark.parametrize("beats", [2, 3])
+def test_several_beats_are_told_with_their_period(ring, beats):
+    told = notes(ring, np.tile(ring.frames, (beats, 1, 1)))
+    assert told == (
+        f"the motion comes again after 100 ms, so that the clip holds {beats} beats: choose a cycle of 10 frames"
+    )
+
+
+def test_line_that_crosses_itself_is_told(ring):
+    """A ring is turned into an eight."""
+
+    def eight(place):
+        return np.column_stack([np.zeros(len(place)), 2 * place[:, 0] * place[:, 1] / 48 - place[:, 1]])
+
+    assert "the endocardial line crosses itself in " in notes(ring, tracker=moving(eight))
+    assert notes(ring, tracker=moving(evenly)) == ""
+
+
+def test_segments_that_differ_threefold_are_named(ring):
+    def at_right(place):
+        return evenly(place) * (place[:, :1] > 0)
+
+    told = notes(ring, tracker=moving(at_right))
+    assert "segments differ threefold or more (" in told and "(8 mid anteroseptal -0 %, " in told
+
+
+def test_steps_that_are_large_for_the_wall_are_told(ring):
+    told = notes(ring, tracker=moving(lambda place: 30 + 0 * place))
+    assert told.startswith("the wall moves by 55 % of its thickness up to frame ")
+
+
+def test_drift_of_less_than_a_third_of_a_pixel_is_none(ring):
+    for left_px, told in ((0.3, False), (0.6, True)):
+
+        def track(frames, points, *_, left_px=left_px):
+            return np.linspace(0, left_px, FRAMES)[:, None, None] * np.ones_like(points) / np.sqrt(2)
+
+        assert ("is left in the last frame" in notes(ring, tracker=track)) == told
