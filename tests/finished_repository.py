@@ -73,7 +73,7 @@ def configured(name="small", seeds=(1, 2), views=("mid", "long_axis"), **changes
         "probe": Probe(elements=16),
         "rf": Rf(lines=32, focal_zones=1),
         "bmode": Bmode(size_px=SIZE, downsampling=(1,)),
-        "tracking": Tracking(trackers={"one": PhaseCorrelation(window_px=16)}),
+        "tracking": Tracking(grid=0.08, trackers={"one": PhaseCorrelation(window_px=16)}),
     }
     swept = {"cases": {"seed": list(seeds)}}
     return Config(name=name, views={view: planes[view] for view in views}, **settings | swept | changes)
@@ -83,7 +83,7 @@ FINISHED = configured(
     "finished",
     cases={"fibres.endo_deg": [60.0, 70.0]},
     bmode=Bmode(size_px=2 * SIZE, downsampling=(1, 2)),
-    tracking=Tracking(grid_px=2, trackers={"one": PhaseCorrelation(window_px=16), "dis": {"method": "dis"}}),
+    tracking=Tracking(grid=0.016, trackers={"one": PhaseCorrelation(window_px=16), "dis": {"method": "dis"}}),
 )
 """Two hearts in two views and two sizes, and two trackers."""
 

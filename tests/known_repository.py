@@ -31,7 +31,10 @@ SETTINGS = {
     "loop": {"frames": FRAMES},
     "views": {"mid": {"position": 0.5}, "long": {"plane": "long_axis", "rotation_deg": 30.0}},
     "bmode": {"size_px": SIZES[0], "downsampling": (1, 2)},
-    "tracking": {"trackers": {name: {"method": "phase_correlation", "window_px": 16} for name in ("one", "two")}},
+    "tracking": {
+        "grid": 0.04,
+        "trackers": {name: {"method": "phase_correlation", "window_px": 16} for name in ("one", "two")},
+    },
 }
 SETTINGS["motion"]["rigid"] |= {
     f"{axis}_um": float(1e6 * shift) for axis, shift in zip(("lateral", "axial", "elevation"), SHIFT, strict=True)

@@ -27,7 +27,7 @@ class Shown:
     inside: np.ndarray
 
 
-OF_GRID = SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}}
+OF_GRID = SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid": 0.016}}
 
 
 def shown_at(folder: Path) -> Shown:

@@ -32,7 +32,7 @@ TUBE = {
     "phantom": {"density_per_mm3": 300.0},
     "rf": {"lines": 48},
     "bmode": {"size_px": 128, "downsampling": (1, 2)},
-    "tracking": {"grid_px": 2},
+    "tracking": {"grid": 0.016},
 }
 
 

@@ -27,7 +27,7 @@ TUBE = {
     "probe": {"elements": 32},
     "rf": {"lines": 33, "focal_zones": 1},
     "bmode": {"size_px": 128, "downsampling": (1, 2)},
-    "tracking": {"grid_px": 2},
+    "tracking": {"grid": 0.016},
 }
 
 

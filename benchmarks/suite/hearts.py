@@ -207,7 +207,7 @@ def _configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None
     if trackers is None:
         corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
         trackers = TRACKERS | {"corrected": corrected}
-    settings = SETTINGS | {"tracking": {"grid_px": 4, "trackers": trackers}}
+    settings = SETTINGS | {"tracking": {"grid": 0.016, "trackers": trackers}}
     return et.configure(merged(settings, nested({"geometry.preset": species} | keys), whole=()))
 
 

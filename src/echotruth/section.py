@@ -61,6 +61,10 @@ Angle = Annotated[FiniteFloat, Field(ge=-90, le=90)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=40)]
 
 
+OF_ZARR = dict.fromkeys(("c", "zarr.json"), "is the name of a file or folder of Zarr: choose another")
+"""Names that no group may have, and so no view, tracker or heart: readers would take it for chunks or metadata."""
+
+
 def invalid(key: str, value: object, remedy: str) -> PydanticCustomError:
     """Validation error of a key whose value conflicts with other keys of its section."""
     return PydanticCustomError("invalid", "{remedy}", {"key": key, "value": value, "remedy": remedy})

@@ -41,7 +41,9 @@ BAD = {
     "tracking: {trackers: {dis: {method: dis, presett: fast}}}": "tracking.trackers.dis.presett is not a key of the "
     "method dis (others: phase_correlation, ",
     "tracking: {trackers: {one: {method: affine_dic, subset_mm: 1000}}}": "subset_mm = 1000.0: must not exceed bmode",
-    "tracking: {grid_px: 100, }\nbmode: {size_px: 64, downsampling: [1]}": "grid_px = 100: must not exceed the largest",
+    "tracking: {grid_px: 5}": "tracking.grid_px is not a key: write tracking.grid, over the side of the image: 0.01",
+    "tracking: {grid: 5}": "tracking.grid = 5: should be less than or equal to 0.25",
+    "views: {c: {}}": "views = 'c': is the name of a file or folder of Zarr: choose another",
     "rf: {focus_mm: 12}": "rf.focus_mm = 12.0: must be smaller than bmode.field_of_view_mm = 12",
     "rf: {focus_mm: 10}": "rf.focus_mm = 10.0: must be smaller than 10, so that its focal_zones = 5 foci, "
     "focal_spacing_mm = 1 apart",
@@ -52,7 +54,7 @@ BAD = {
     "mechanics: {material: {fiber: 9}}": "fiber is not a key of the law fung (others: guccione, holzapfel_ogden, "
     "neo_hooke): did you mean mechanics.material.fibre?",
     "views: {a b: {}}": "views: the name 'a b': use letters, digits and underscores only, and begin with a letter",
-    "tracking: {trackers: {wall_axes: {}}}": "tracking.trackers = 'wall_axes': is the name of an array of the repo",
+    "tracking: {trackers: {c: {}}}": "tracking.trackers = 'c': is the name of a file or folder of Zarr: choose",
 }
 
 

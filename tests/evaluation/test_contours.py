@@ -41,7 +41,7 @@ TUBE = {
         "long": {"plane": "long_axis"},
     },
     "bmode": {"size_px": 256, "downsampling": [1]},
-    "tracking": {"grid_px": 2},
+    "tracking": {"grid": 0.008},
 }
 
 

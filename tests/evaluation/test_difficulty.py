@@ -299,13 +299,13 @@ def test_table_of_a_repository_is_kept_until_its_images_change(known, monkeypatc
 
 def test_table_is_made_again_for_the_points_of_another_grid(known, monkeypatch):
     asked = []
-    monkeypatch.setattr(table, "difficulty", lambda _, *clip: asked.append(read.case().config.tracking.grid_px) or [])
+    monkeypatch.setattr(table, "difficulty", lambda _, *clip: asked.append(read.case().config.tracking.grid) or [])
     read = et.Repository(known.folder)
-    finer = replace(known.case, config=et.configure(known.case.config, tracking={"grid_px": 3}))
+    finer = replace(known.case, config=et.configure(known.case.config, tracking={"grid": 0.025}))
     for case in (known.case, known.case, finer):
         monkeypatch.setattr(read, "case", lambda *_, case=case: case)
         table._kept(read, case.id, "long")
-    assert asked[-2:] == [5, 3] and len(asked) == 2
+    assert asked[-2:] == [0.04, 0.025] and len(asked) == 2
 
 
 def test_unknown_case_or_view_is_named(known):

@@ -35,7 +35,7 @@ def large_only(frames, points, mask, spacing, frame_time, seed):
 def finished(tmp_path_factory):
     """A repository of one heart that moves as a rigid body, at two image sizes."""
     folder = tmp_path_factory.mktemp("kept") / "known"
-    return make(folder, SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid_px": 2}}).folder
+    return make(folder, SETTINGS | {"tracking": SETTINGS["tracking"] | {"grid": 0.016}}).folder
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def test_images_made_anew_are_not_those_that_were_tracked(repository):
 def test_points_of_another_grid_are_not_those_that_were_tracked(repository):
     evaluate(repository, views=["mid"])
     path = repository / "config.yaml"
-    path.write_text(path.read_text().replace("grid_px: 2", "grid_px: 4"))
+    path.write_text(path.read_text().replace("grid: 0.016", "grid: 0.03"))
     with pytest.raises(ValueError, match=r"^tracker = 'mine': it was evaluated on .* other points, of heart mid"):
         et.Repository(repository).tracks(view="mid", trackers=["mine"])
 

@@ -8,22 +8,20 @@ from bokeh.document import Document
 import echotruth as et
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
 from echotruth.evaluation.no_estimate import LOST, NOT_SHOWN, reason
-from echotruth.evaluation.strain import largest_grid
 from echotruth.report.account import failures
 from echotruth.viewer.choice import first
 from echotruth.viewer.page import Page
 
 UNKNOWN, KNOWN = np.full(3, np.nan), np.zeros(3)
-FINE, COARSE = (Config(bmode=Bmode(size_px=512), tracking=Tracking(grid_px=grid)) for grid in (7, 8))
+FINE, COARSE = (Config(bmode=Bmode(size_px=512), tracking=Tracking(grid=grid)) for grid in (0.0146, 0.0147))
 
 
 def test_reasons_in_the_order_in_which_they_hold():
-    assert largest_grid(512) == 7
     assert reason(KNOWN, UNKNOWN, COARSE, "lost") == ""
     assert reason(UNKNOWN, UNKNOWN, COARSE, "lost") == NOT_SHOWN
     assert reason(UNKNOWN, KNOWN, COARSE, "no texture") == "the tracker failed: no texture"
-    few = "with tracking.grid_px = 8 there are too few points through the wall: use 7 or less"
-    assert reason(UNKNOWN, KNOWN, COARSE) == few
+    few = "points 8 px apart in an image of 512 px are too few through the wall for strain at its borders"
+    assert reason(UNKNOWN, KNOWN, COARSE) == f"tracking.grid = 0.0147: {few}: use 0.01 or less"
     assert reason(UNKNOWN, KNOWN, COARSE, is_strain=False) == LOST
     assert reason(UNKNOWN, KNOWN, FINE) == reason(np.array([0, np.nan, 0]), KNOWN, FINE) == LOST
 
@@ -38,11 +36,11 @@ def unknown_strain(job):
     return found
 
 
-@pytest.fixture(scope="module", params=[(1, LOST), (20, "with tracking.grid_px = 20 there are too few points .*")])
+@pytest.fixture(scope="module", params=[(0.01, LOST), (0.16, "tracking.grid = 0.16: points 20 px apart .*")])
 def repository(request, tmp_path_factory):
     """A repository of images of 128 px, and the reason why nothing has a strain in it."""
     grid, expected = request.param
-    tracking = Tracking(trackers={"one": PhaseCorrelation(window_px=16)}, grid_px=grid)
+    tracking = Tracking(trackers={"one": PhaseCorrelation(window_px=16)}, grid=grid)
     config = finished.configured(seeds=(1,), bmode=Bmode(size_px=128, downsampling=(1,)), tracking=tracking)
     folder = finished.finish(tmp_path_factory.mktemp("unknown") / "small", config, unknown_strain)
     return et.Repository(folder), expected

@@ -35,7 +35,7 @@ AXIS = (np.arange(96) + 0.5) / 96 * 12e-3
 def config(frames, motion):
     views = {"mid": POSE | {"motion": motion}, "long": POSE | {"plane": "long_axis", "motion": motion}}
     return Config.model_validate(
-        {"loop": {"frames": frames, "heart_rate_per_min": 500.0}, "views": views, "tracking": {"grid_px": 8}}
+        {"loop": {"frames": frames, "heart_rate_per_min": 500.0}, "views": views, "tracking": {"grid": 0.016}}
     )
 
 

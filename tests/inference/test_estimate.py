@@ -36,7 +36,7 @@ def heart():
         geometry=mesh,
         loop={"frames": 8},
         mechanics={"regional": {"preset": "even", "contractility": TRUE}},
-        tracking={"grid_px": 8},
+        tracking={"grid": 0.016},
     )
     return et.beat(config, frames=et.systole(config))
 

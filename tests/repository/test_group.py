@@ -17,7 +17,7 @@ from echotruth.repository.coordinates import coordinates_of
 from echotruth.repository.group import NotWritten
 from echotruth.repository.places import group_of, place
 
-CONFIG = configured(tracking=Tracking(grid_px=2, trackers={name: {"method": "dis"} for name in ("one", "two")}))
+CONFIG = configured(tracking=Tracking(grid=0.03, trackers={name: {"method": "dis"} for name in ("one", "two")}))
 SIZE = CONFIG.bmode.size_px
 ABOUT = {"status": "complete", "version": "1"}
 

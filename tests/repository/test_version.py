@@ -105,7 +105,7 @@ CHANGES = {
     "bmode.size_px": (128, IMAGES | {"truth"}),
     "bmode.downsampling": ([2], IMAGES | {"truth"}),
     "bmode.field_of_view_mm": (13.0, RF | {"truth"}),
-    "tracking.grid_px": (4, {"tracking"}),
+    "tracking.grid": (0.02, {"tracking"}),
     "probe.elements": (20, RF),
     "phantom.density_per_mm3": (60.0, RF),
     "seed": (5, RF),

@@ -113,7 +113,7 @@ def test_row_at_the_pose_of_the_configuration_has_the_id_of_the_heart_without_on
 
 def test_views_themselves_and_the_trackers_are_the_same_in_all_rows(refusal):
     assert "views.mid.plane cannot be swept" in refusal("views.mid.plane\nlong_axis\n")
-    assert "tracking.grid_px cannot be swept" in refusal("tracking.grid_px\n3\n")
+    assert "tracking.grid cannot be swept" in refusal("tracking.grid\n0.02\n")
     assert "tracking.trackers.dis.preset cannot be swept" in refusal("tracking.trackers.dis.preset\nfast\n")
     assert "did you mean views.mid.position?" in refusal("views.middle.position\n0.3\n")
     assert "row 1: views.mid.position = 3" in refusal("views.mid.position\n3\n")

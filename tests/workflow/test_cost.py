@@ -92,7 +92,7 @@ def test_time_in_words(seconds, text):
           "bmode": {"field_of_view_mm": 45.0}},
          "bmode.field_of_view_mm = 45: the heart is", True),
         ({"bmode": {"size_px": 64, "downsampling": [1]}}, "bmode.size_px = 64: a pixel is", False),
-        ({"tracking": {"grid_px": 30}}, "tracking.grid_px = 30: points", False),
+        ({"tracking": {"grid": 0.06}}, "tracking.grid = 0.06: points", False),
         ({}, "", False),
     ],
 )  # fmt: skip

@@ -30,7 +30,7 @@ GROWN = {
     "cases": Cases.model_validate({"fibres.endo_deg": [60.0]}),
     "views": {"long_axis": FINISHED.views["long_axis"]},
     "bmode": Bmode(size_px=2 * SIZE, downsampling=(1,)),
-    "tracking": Tracking(grid_px=2, trackers={"dis": TRACKERS["dis"]}),
+    "tracking": Tracking(grid=0.016, trackers={"dis": TRACKERS["dis"]}),
 }
 """What the repository has at first; the rest is then added, section by section: a tracker in front of the first one."""
 

@@ -12,7 +12,7 @@ from echotruth.config import Config
 from echotruth.config.loading import ConfigError
 from echotruth.config.reading import Errors
 from echotruth.config.table import CASE, LABEL, NOTE, labels, swept
-from echotruth.section import value_of
+from echotruth.section import OF_ZARR, value_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,6 +78,8 @@ def _ids(table: pd.DataFrame, place: str) -> list[str]:
         if id and (len(id) > GIVEN_LENGTH or not re.fullmatch(GIVEN, id)):
             remedy = "use at most 80 letters without accents, digits, _, - and ., and begin with a letter or digit"
             raise ConfigError(f"{place}, row {number}: case = {id[:80]!r}: {remedy}")
+        if id in OF_ZARR:
+            raise ConfigError(f"{place}, row {number}: case = {id}: {OF_ZARR[id]}")
         if id and rows.setdefault(id, number) != number:
             raise ConfigError(f"{place}, row {number}: case = {id} is the id of row {rows[id]} too: give it another")
     return ids

@@ -114,7 +114,8 @@ def _message(error: ErrorDetails, root: type[BaseModel]) -> str:
         names = _either([repr(name) for name in sections])
         return f"{dotted_key}.{selector} = {_shown_value(value[selector])}: should be {names}"
     if kind == "extra_forbidden":
-        return f"{dotted_key} is not a key{_variant(model, sections)}{_suggestion(keys, model, bool(sections))}"
+        remedy = _RENAMED.get(dotted_key) or _suggestion(keys, model, bool(sections))
+        return f"{dotted_key} is not a key{_variant(model, sections)}{remedy}"
     if kind == "missing":
         return f"{dotted_key} is missing: it must be given"
     given = f"{dotted_key} = {_shown_value(value)}" if keys else _shown_value(value)
@@ -167,6 +168,9 @@ _NAMES = (
     "use letters, digits, `_`, `.` and `-` only, and begin with a letter or digit",
 )
 """What names are made of, and those of files."""
+
+_RENAMED = {"tracking.grid_px": ": write tracking.grid, over the side of the image: 0.01 for 5 px of 512"}
+"""Key of earlier versions -> what to write in its place."""
 
 MAX_SUGGESTIONS = 5
 """Largest number of keys of other sections that are named in place of one that is not known."""

@@ -20,7 +20,7 @@ from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Neighbours, Realism
 from echotruth.config.tracking import PhaseCorrelation, Tracking
-from echotruth.section import Section, check, invalid, value_of
+from echotruth.section import OF_ZARR, Section, check, invalid, value_of
 
 _TRACKER_LENGTHS = ("window_mm", "windows_mm", "subset_mm", "knots_mm")
 """Keys of trackers that must not exceed the image."""
@@ -66,14 +66,11 @@ class Config(Section):
 
     @check
     def _check_lengths(self) -> None:
-        side, rf, tracking, largest = self.bmode.field_of_view_mm, self.rf, self.tracking, self.bmode.size_px
+        side, rf, tracking = self.bmode.field_of_view_mm, self.rf, self.tracking
         for name, tracker in tracking.trackers.items():
             self._check_tracker(f"tracking.trackers.{name}", tracker)
         remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
         self.require(tracking.frame_step < self.loop.frames, "tracking.frame_step", remedy)
-        self.require(
-            tracking.grid_px <= largest, "tracking.grid_px", f"must not exceed the largest image, {largest} px"
-        )
         self.require(rf.focus_mm < side, "rf.focus_mm", f"must be smaller than bmode.field_of_view_mm = {side:g}")
         foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
         remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
@@ -102,9 +99,9 @@ class Config(Section):
 
     @check
     def _check_view_names(self) -> None:
-        if ALL_VIEWS in self.views:
-            remedy = "is the name of the mean over all views in the leaderboard: give the view another name"
-            raise invalid("views", ALL_VIEWS, remedy)
+        taken = OF_ZARR | {ALL_VIEWS: "is the name of the mean over all views in the leaderboard: choose another"}
+        for name in taken.keys() & self.views:
+            raise invalid("views", name, taken[name])
 
     @check
     def _check_focus(self) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.section import Name, Positive, Section, check, invalid, tagged
+from echotruth.section import OF_ZARR, Name, Positive, Section, check, invalid, tagged
 
 Reference = Annotated[
     Literal["ED", "previous", "bidirectional"],
@@ -322,20 +322,13 @@ def default_trackers(scale: float = 1.0) -> dict[str, Any]:
     }
 
 
-NOT_TRACKERS = {
-    *("true_displacement", "true_strain", "wall_axes", "limits", "true_courses", "c"),
-    *("axial", "case", "frame", "lateral", "plane", "polar", "reference", "time", "vector", "view", "wall_component"),
-    *("limit", "limit_units", "true_course", "true_course_units"),
-}
-"""Names that no tracker may have: its group stands beside the arrays of `evaluation/SIZE`, and Zarr has a folder c."""
-
-
 class Tracking(Section):
     """Trackers and the grid they report on."""
 
-    grid_px: Annotated[int, Field(ge=1, le=128)] = 5
-    """Spacing of the points at which displacement is reported, in pixels of the largest image; the points are the same
-    at all image sizes and lie in the wall at end-diastole."""
+    grid: Annotated[FiniteFloat, Field(gt=0, le=0.25)] = 0.01
+    """Spacing of the points at which displacement is reported, over the side of the image, rounded to whole pixels of
+    the largest image: 0.01 are 5 of 512. The points are the same at all image sizes and lie in the wall at
+    end-diastole. There is no strain at the borders of the wall if they are more than 0.015 apart."""
     frame_step: Annotated[int, Field(ge=1, le=1000)] = 1
     """Trackers are given every n-th frame, as of a scanner with an n-th of the frame rate. Displacement and quality in
     the frames between are interpolated linearly in time; the cycle closes, so that after the last given frame they lead
@@ -348,7 +341,5 @@ class Tracking(Section):
 
     @check
     def _check_names(self) -> None:
-        for name in self.trackers:
-            if name in NOT_TRACKERS:
-                remedy = "is the name of an array of the repository: give the tracker another name"
-                raise invalid("trackers", name, remedy)
+        for name in OF_ZARR.keys() & self.trackers:
+            raise invalid("trackers", name, OF_ZARR[name])

@@ -7,10 +7,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from echotruth.aha import SEGMENT_NAMES
 from echotruth.arrays import Floats
 from echotruth.config.building import configure, tracker_section
 from echotruth.config.defaults import REFERENCE_FIELD_OF_VIEW_MM
-from echotruth.config.tracking import Tracking
 from echotruth.echo.doubts import doubts, rms_length
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import LAYERS, Wall
@@ -24,7 +24,7 @@ from echotruth.tracking import plausibility
 from echotruth.tracking.plausibility import REFERENCE_WALL_MM
 from echotruth.tracking.tracker import track
 
-GRID_PX, IMAGE_PX = Tracking.model_fields["grid_px"].default, 512
+GRID_PX, IMAGE_PX = 5, 512
 """Spacing of the points in a mouse's clip, and the side of that clip, which shows 12 mm."""
 
 MIN_WALL_PX = 6.0
@@ -245,6 +245,7 @@ def _dataset(values: dict[str, Floats], position: Floats, tissue: WallPoints, cl
             "plane": ["lateral", "axial"],
             "region": ["wall", "endocardial", "middle", "epicardial"],
             "aha": np.arange(1, 18),
+            "aha_name": ("aha", list(SEGMENT_NAMES)),
             **{name: list(LABELS[name]) for name in ("measure", "wall_component", "contour")},
         },
     )

@@ -4,7 +4,8 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config import Config
-from echotruth.evaluation.strain import largest_grid
+from echotruth.evaluation.strain import MAX_SPACING, RADIUS
+from echotruth.tracking.point_grid import spacing_px
 
 FAILED = "the tracker failed"
 NOT_SHOWN = "the view does not show it"
@@ -31,8 +32,15 @@ def reason(tracked: Floats, true: Floats, config: Config, failure: str = "", is_
         return NOT_SHOWN
     if failure:
         return f"{FAILED}: {failure}"
-    most = largest_grid(config.bmode.size_px)
-    if is_strain and config.tracking.grid_px > most:
-        remedy = f"use {most} or less" if most else "raise bmode.size_px"
-        return f"with tracking.grid_px = {config.tracking.grid_px} there are too few points through the wall: {remedy}"
-    return LOST
+    return (is_strain and coarse_grid(config)) or LOST
+
+
+def coarse_grid(config: Config) -> str:
+    """Why the points are too far apart for strain at the borders of the wall, with a remedy; empty if they are not."""
+    size, apart = config.bmode.sizes[0], spacing_px(config)
+    if apart <= MAX_SPACING * RADIUS * size:
+        return ""
+    too_few = f"points {apart} px apart in an image of {size} px are too few through the wall for strain at its borders"
+    if apart == 1:
+        return f"bmode.size_px = {config.bmode.size_px}: {too_few}: use a larger one"
+    return f"tracking.grid = {config.tracking.grid:g}: {too_few}: use 0.01 or less"

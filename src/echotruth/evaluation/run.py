@@ -195,7 +195,7 @@ def prepare(repository: Repository, name: str, values: dict[str, Any], keep: boo
     if name in config.tracking.trackers:
         taken = f"{name} is already a tracker of {repository.folder}"
         raise EvaluationError(f"{taken}: give this one another name with --name")
-    tracking = {"grid_px": config.tracking.grid_px, "trackers": {name: values}}
+    tracking = {"grid": config.tracking.grid, "trackers": {name: values}}
     checked = validate(config.model_dump() | {"tracking": tracking}, f"tracker {name}")
     return EvaluationRun(repository, name, checked.tracking.trackers[name], keep)
 

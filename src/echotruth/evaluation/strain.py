@@ -33,11 +33,6 @@ see half a disc of others, have the neighbours that a fit needs; from 0.45 on ha
 in the middle of the wall."""
 
 
-def largest_grid(size_px: int) -> int:
-    """Spacing of the points, px of the largest image, up to which there is strain at the borders of the wall."""
-    return int(MAX_SPACING * RADIUS * size_px)
-
-
 @dataclass(frozen=True)
 class StrainOperator:
     """Linear operator from displacement to strain at the points of one view.

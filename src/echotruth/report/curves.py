@@ -15,7 +15,7 @@ ROOM = 0.6
 trackers may leave it."""
 
 NO_VALUES = "no tracked values:\nis the grid too coarse?"
-"""Words in a panel without curves of trackers: strain needs several points through the wall (`tracking.grid_px`)."""
+"""Words in a panel without curves of trackers: strain needs several points through the wall (`tracking.grid`)."""
 
 
 @dataclass(frozen=True)

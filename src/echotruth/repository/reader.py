@@ -629,7 +629,7 @@ class Repository:
         """Version of a view as trackers get it: its images and truth, and the frames and points that are tracked."""
         found = [self.attributes(f"{stage}/{self.sizes[0]}", case, view).get("version") for stage in ("truth", "bmode")]
         tracking = self.case(case).config.tracking
-        return sha256(repr((*found, tracking.frame_step, tracking.grid_px)).encode()).hexdigest()[:16]
+        return sha256(repr((*found, tracking.frame_step, tracking.grid)).encode()).hexdigest()[:16]
 
     def _text(self, name: str) -> str:
         """Content of a text file in the folder."""

@@ -7,6 +7,11 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.tracking.windows import grid
 
 
+def spacing_px(config: Config) -> int:
+    """Spacing of the points, px of the largest image."""
+    return max(1, round(config.tracking.grid * config.bmode.sizes[0]))
+
+
 def grid_points(config: Config, size: int) -> np.ndarray:
     """Points of the grid, at the same positions in the tissue for every image size.
 
@@ -23,7 +28,7 @@ def grid_points(config: Config, size: int) -> np.ndarray:
     """
     largest = config.bmode.sizes[0]
     # A pixel of a smaller image is the mean of a block of pixels: x_small + 1/2 = (x_largest + 1/2) size / largest.
-    return (grid((largest, largest), config.tracking.grid_px) + 0.5) * (size / largest) - 0.5
+    return (grid((largest, largest), spacing_px(config)) + 0.5) * (size / largest) - 0.5
 
 
 def grid_pixels(config: Config) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from echotruth.config import Config
-from echotruth.evaluation.strain import largest_grid
+from echotruth.evaluation.no_estimate import coarse_grid
 
 MAX_PIXEL_WAVELENGTHS = 2.0
 """Pixel of the largest image over the wavelength from which on speckle is lost between pixels: it is about one
@@ -37,11 +37,8 @@ def _of_the_images(config: Config) -> Iterator[Concern]:
         text = f"a pixel is {pixel:.2g} wavelengths wide, so that speckle is lost between pixels"
         remedy = f"use {side / (MAX_PIXEL_WAVELENGTHS * wavelength):.0f} px or more"
         yield Concern(f"bmode.size_px = {config.bmode.size_px}: {text}: {remedy}", False)
-    most = largest_grid(config.bmode.size_px)
-    if config.tracking.grid_px > most >= 1:
-        apart = config.tracking.grid_px * side / config.bmode.size_px
-        text = f"points {apart:.2g} mm apart are too few through the wall for strain at its borders, which stays empty"
-        yield Concern(f"tracking.grid_px = {config.tracking.grid_px}: {text}: use {most} or less", False)
+    if text := coarse_grid(config):
+        yield Concern(text, False)
 
 
 def _of_the_file(config: Config) -> Iterator[Concern]:
