@@ -30,7 +30,7 @@ CONFIG = Config(
     views={"mid": View(), "apex": View(position=0.7)},
     bmode=Bmode(size_px=128, downsampling=(1, 2)),
     tracking=Tracking(
-        grid_px=2,
+        grid=0.016,
         trackers={
             "ours": PhaseCorrelation(window_px=32),
             "lot": External(track="custom:drawn"),

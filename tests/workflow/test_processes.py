@@ -41,7 +41,15 @@ def test_processes_that_compile_forms_of_a_function_at_once_keep_them_all(tmp_pa
 
 
 def shell(code, root=ROOT, **options):
-    return subprocess.run(["bash", "-c", prefix(root) + code], capture_output=True, text=True, check=False, **options)
+    return subprocess.run(
+        ["bash", "-c", prefix(root).format() + code], capture_output=True, text=True, check=False, **options
+    )
+
+
+def test_working_folder_may_have_braces_which_snakemake_takes_for_names(tmp_path, monkeypatch):
+    (tmp_path / "{case}").mkdir()
+    monkeypatch.chdir(tmp_path / "{case}")
+    assert f"{tmp_path}/{{case}}/.snakemake/numba" in prefix(ROOT).format()
 
 
 def test_shell_of_a_job_knows_its_scripts_its_package_and_the_python_of_this_process():

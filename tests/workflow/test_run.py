@@ -112,7 +112,7 @@ def test_targets_come_after_all_options_since_snakemake_takes_them_for_configura
 
 def executed(tmp_path, code, rule="rf"):
     """Exit status of a program in place of Snakemake."""
-    return execute([sys.executable, "-c", code], tmp_path / "logs/snakemake.log", "tiny", Progress({rule: 1}))
+    return execute([sys.executable, "-c", code], tmp_path, Progress({rule: 1}))
 
 
 def test_output_is_kept_and_the_log_of_a_failed_job_is_shown(tmp_path, capfd):
@@ -130,6 +130,19 @@ def test_without_a_failed_job_the_output_itself_is_shown(tmp_path, capfd):
     assert executed(tmp_path, "print('done')") == 0 and "done" not in capfd.readouterr().err
 
 
+def test_run_that_begins_beside_another_leaves_its_log_alone(tmp_path):
+    another = (
+        f"from pathlib import Path; from echotruth.workflow.run import execute; execute([], Path({str(tmp_path)!r}), 0)"
+    )
+    assert executed(tmp_path, f"print('first', flush=True); {another}") == 1
+    said = (tmp_path / "logs/snakemake.log").read_text().splitlines()
+    assert said[0] == "first" and said[-1].endswith(
+        f"LockError: {tmp_path}: another run works on it: wait for it, or stop it"
+    )
+    assert executed(tmp_path, "print('next')") == 0
+    assert (tmp_path / "logs/snakemake.log").read_text() == "next\n"
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_signal_ends_snakemake_with_all_that_it_started(tmp_path, number):
     code = "import subprocess, sys, time; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(99)'])"
@@ -143,9 +156,13 @@ def test_signal_ends_snakemake_with_all_that_it_started(tmp_path, number):
             time.sleep(0.05)
         os.kill(os.getpid(), number)
 
+    inherited = signal.signal(number, signal.SIG_DFL)  # nohup has it ignored
     threading.Thread(target=send, daemon=True).start()
-    with pytest.raises(SystemExit) as ended:
-        executed(tmp_path, f"{code}; time.sleep(99)")
+    try:
+        with pytest.raises(SystemExit) as ended:
+            executed(tmp_path, f"{code}; time.sleep(99)")
+    finally:
+        signal.signal(number, inherited)
     assert ended.value.code == 128 + number and not started()
 
 

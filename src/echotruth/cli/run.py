@@ -110,10 +110,11 @@ def _make(arguments: argparse.Namespace, config: Config, cases: list[Case]) -> i
     from echotruth.workflow.status import status_of, verdicts
 
     start, folder = time.time(), Path("out") / config.name
-    if lock.is_held(folder):
-        return fail(f"{folder}: another run works on it: wait for it, or stop it")
     progress = Progress({rule: cost.seconds(rule, config) for rule in cost.SECONDS})
-    status = execute(_command(arguments), folder / "logs/snakemake.log", config.name, progress)
+    try:
+        status = execute(_command(arguments), folder, progress)
+    except lock.LockError as error:
+        return fail(str(error))
     if status == REFUSED:
         return fail("Snakemake does not take these options: see echotruth run --help")
     if status:

@@ -14,6 +14,8 @@ JOBS = ".jobs"
 TRIES, SECONDS = 5, 0.1
 """How often, and how long after one another, a lock is tried."""
 
+ANOTHER = "{}: another run works on it: wait for it, or stop it"
+
 _held: list[IO[bytes]] = []
 
 
@@ -42,7 +44,7 @@ def hold(folder: Path) -> bool:
             raise LockError(f"{folder}: jobs of a run that was killed still work: wait for them, or stop them")
         file = (folder / ".lock").open("ab")
         if not _is_free(file):
-            raise LockError(f"{folder}: another run works on it: wait for it, or stop it")
+            raise LockError(ANOTHER.format(folder))
     _held.append(file)  # closed, and so released, with this process
     os.environ[VARIABLE] = str(folder.absolute())
     return True
@@ -55,7 +57,19 @@ def share(folder: Path) -> None:
     _held.append(file)
 
 
-def _is_free(file: IO[bytes]) -> bool:
+def claim(log: IO[str], folder: Path) -> None:
+    """Lock the log of a run, before it has locked its folder, until the file is closed.
+
+    Raises
+    ------
+    LockError
+        If another run holds one of them.
+    """
+    if is_held(folder) or not _is_free(log):
+        raise LockError(ANOTHER.format(folder))
+
+
+def _is_free(file: IO) -> bool:
     """Lock a file for this process alone; whoever only looks whether it is locked holds it for a moment."""
     for _ in range(TRIES):
         try:

@@ -33,7 +33,8 @@ def prefix(root: Path) -> str:
     if (root / "src").is_dir():
         variables["PYTHONPATH"] = f"{root / 'src'}:{os.environ.get('PYTHONPATH', '')}".rstrip(":")
     exports = " ".join(f"{name}={quote(value)}" for name, value in variables.items())
-    return f"set -euo pipefail; {forbidden}{instructions.exports()}export {exports}; "
+    commands = f"set -euo pipefail; {forbidden}{instructions.exports()}export {exports}; "
+    return commands.replace("{", "{{").replace("}", "}}")
 
 
 def cache_name() -> str:

@@ -12,6 +12,7 @@ import psutil
 
 from echotruth.config import shipped
 from echotruth.extras import require
+from echotruth.workflow import lock
 from echotruth.workflow.progress import Progress
 
 POLL_SECONDS, LINE_SECONDS = 0.5, 30.0
@@ -31,21 +32,28 @@ def snakemake_command(path: Path | str, options: list[str], targets: list[str]) 
     return [*command, "--configfile", str(path), "--nolock", *options, *(["--", *targets] if targets else [])]
 
 
-def execute(command: list[str], log: Path, name: str, progress: Progress) -> int:
+def execute(command: list[str], folder: Path, progress: Progress) -> int:
     """Run Snakemake, show its progress or what failed on stderr, and return its exit status.
 
     Parameters
     ----------
     command : list of str
-    log : Path
-        File for its output.
-    name : str
-        Name of the repository.
+    folder : Path
+        Of the repository; the output is in its `logs/snakemake.log`.
     progress : Progress
+
+    Raises
+    ------
+    LockError
+        If another run works on the folder; its log stays as it is.
     """
+    log = folder / "logs/snakemake.log"
     log.parent.mkdir(parents=True, exist_ok=True)
-    line = ProgressLine(name, sys.stderr)
-    with log.open("w") as output, log.open(errors="replace") as told:
+    line = ProgressLine(folder.name, sys.stderr)
+    with log.open("a") as output, log.open("a+", errors="replace") as told:
+        lock.claim(told, folder)
+        told.truncate(0)
+        told.seek(0)
         process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         # What is ignored, as by nohup, stays so.
         signals = [one for one in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(one) != signal.SIG_IGN]
