@@ -138,7 +138,7 @@ def test_rows_are_of_the_hearts_that_count(tmp_path):
 
 def test_a_repository_whose_hearts_are_not_finished_has_no_rows(tmp_path):
     table = rows(board(tmp_path, ""))
-    assert table.empty and list(table.columns) == ["case", "view", "size_px", "tracker", "failure"]
+    assert table.empty and list(table.columns) == ["case", "view", "size_px", "tracker", "failure", "no_estimate"]
 
 
 def test_a_failure_is_told_beside_the_scores(tmp_path):

@@ -31,7 +31,7 @@ def unknown_strain(job):
     found = finished.blank(job)
     for group, arrays in found.items():
         if group.startswith("tracking/"):
-            for name in ("tracked_region_strain", "tracked_segment_strain", "tracked_line_strain"):
+            for name in ("tracked_region_strain", "tracked_segment_strain", "tracked_line_strain", "strain_rms"):
                 arrays[name] = np.full(arrays[name].shape, np.nan)
     return found
 
@@ -53,6 +53,13 @@ def test_table_has_the_reason_beside_what_is_not_known(repository):
     assert len(strain) and strain["tracked_es"].isna().all() and strain["no_estimate"].str.fullmatch(expected).all()
     others = table[table["quantity"] == "rotation"]
     assert len(others) and others["tracked_es"].notna().all() and (others["no_estimate"] == "").all()
+
+
+def test_scores_have_the_reason_beside_what_is_not_known(repository):
+    found, expected = repository
+    clips, segments, _ = found.metrics()
+    for table, name in ((found.scores, "e_rr_rms_pp"), (clips, "e_rr_rms_pp"), (segments, "tracked_es_percent")):
+        assert len(table) and table[name].isna().all() and table["no_estimate"].str.fullmatch(expected).all()
 
 
 def test_report_lists_it(repository):

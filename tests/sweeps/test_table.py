@@ -177,6 +177,7 @@ REFUSED = {
     "case,label.my age\na,60\n": "column 'label.my age': name it label.",
     "case,fibres\na,60\n": "column 'fibres': fibres is a section",
     "case,seed\na b,1\n": "row 1: case = 'a b': use at most 80 letters",
+    "case,seed\nzarr.json,1\n": "row 1: case = zarr.json: is the name of a file or folder of Zarr: choose another",
     "case,seed\na,1\n\nb,2\na,3\n": "row 4: case = a is the id of row 1 too",
     "case,seed\na,1\nA,2\n": "row 1 and hearts.csv, row 2 have ids that differ in capitals alone",
     "seed,label.x\n2,a\n2,b\n": "row 1 and hearts.csv, row 2 are the same heart, seed2_b105c5: leave one",

@@ -19,6 +19,7 @@ from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.courses import rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE
 from echotruth.evaluation.leaderboard import KEYS, SCORES, failures_of, scores_of_guests
+from echotruth.evaluation.no_estimate import of_scores, reason
 from echotruth.evaluation.scoring import metrics
 from echotruth.evaluation.segment_strain import Row
 from echotruth.imaging.labels import unpack
@@ -112,7 +113,10 @@ def clip_metrics(
                 for table, more in zip(found, rows, strict=True):
                     table += [keys | row for row in more]
     clips, segments, steps = found
-    return ClipMetrics(_table(clips), _table(segments, segment_strain.COLUMNS), _table(steps, reliability.COLUMNS))
+    for row in clips:
+        row["no_estimate"] = of_scores(row, str(row["plane"]), repository.config)
+    of_segments = _table(segments, (*segment_strain.COLUMNS, "no_estimate"))
+    return ClipMetrics(_table(clips), of_segments, _table(steps, reliability.COLUMNS))
 
 
 def _table(rows: list[Row], columns: Sequence[str] = ()) -> pd.DataFrame:
@@ -197,9 +201,12 @@ def _of_view(
     for size, tracker, found in estimates.each(repository, case, view, sizes, stored, *names):
         keys: Row = {"size_px": size, "tracker": tracker}
         of_guest = told.pop((size, tracker), {})
-        reason = failures.get((tracker, size), str(of_guest.get("failure", "")))
+        failure = failures.get((tracker, size), str(of_guest.get("failure", "")))
         clip, segments, steps = clip_rows(found, truth)
-        yield [{**keys, "failure": reason, **clip}], [keys | row for row in segments], [keys | step for step in steps]
+        for row in segments:
+            tracked, true = (np.array(row[f"{what}_es_percent"], float) for what in segment_strain.WHAT)
+            row["no_estimate"] = reason(tracked, true, repository.config, failure)
+        yield [{**keys, "failure": failure, **clip}], [keys | row for row in segments], [keys | step for step in steps]
     for (size, tracker), row in told.items():
         if size in sizes and tracker in trackers:
             values = {name: value for name, value in row.items() if name not in KEYS[:2]}

@@ -19,6 +19,7 @@ import numpy as np
 import pandas as pd
 
 from echotruth.config.imaging import ALL_VIEWS
+from echotruth.evaluation.no_estimate import of_scores
 from echotruth.evaluation.paired_ratios import log_scores, rank_ranges
 from echotruth.evaluation.resampling import draws, interval, means_of_hearts, ranks
 from echotruth.evaluation.scoring import metrics
@@ -56,8 +57,9 @@ def rows(repository: Repository) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Columns of `KEYS`, those of :func:`echotruth.evaluation.scoring.metrics`, and `failure`: why the tracker failed,
-        or "". Without a heart there are no rows, and no columns of metrics.
+        Columns of `KEYS`, those of :func:`echotruth.evaluation.scoring.metrics`, `failure`: why the tracker failed,
+        or ""; and `no_estimate`: why it lacks a strain that the view shows, or "". Without a heart there are no rows,
+        and no columns of metrics.
 
     Raises
     ------
@@ -74,7 +76,9 @@ def rows(repository: Repository) -> pd.DataFrame:
         table = _external_rows(repository, file, builtin.columns)
         table = table[~table["tracker"].isin(builtin["tracker"]) & pd.MultiIndex.from_frame(table[clip]).isin(known)]
         tables += [table] if len(table) else []
-    return pd.concat(tables, ignore_index=True)
+    table, views = pd.concat(tables, ignore_index=True), repository.config.views
+    why = [of_scores(row, views[row["view"]].plane, repository.config) for row in table.to_dict("records")]
+    return table.assign(no_estimate=why)
 
 
 def standings(rows: pd.DataFrame, seed: int, hearts: Mapping[str, str] | None = None) -> pd.DataFrame:
@@ -100,7 +104,9 @@ def standings(rows: pd.DataFrame, seed: int, hearts: Mapping[str, str] | None = 
         NaN with a single heart and where there is no mean.
     """
     heart = rows["case"] if hearts is None else rows["case"].map(hearts)
-    rows = rows.assign(**{HEART: heart, RANKED_BY: log_scores(rows[RANKED_BY])})
+    rows = rows.drop(columns="no_estimate", errors="ignore").assign(
+        **{HEART: heart, RANKED_BY: log_scores(rows[RANKED_BY])}
+    )
     cases_of = rows.groupby(HEART, sort=False)["case"].nunique()
     views, resamples = list(dict.fromkeys(rows["view"])), draws(len(cases_of), seed)
     tables = []

@@ -1,5 +1,8 @@
 """Why a tracker has no estimate of a strain or a rotation, in words."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from echotruth.arrays import Floats
@@ -33,6 +36,23 @@ def reason(tracked: Floats, true: Floats, config: Config, failure: str = "", is_
     if failure:
         return f"{FAILED}: {failure}"
     return (is_strain and coarse_grid(config)) or LOST
+
+
+def of_scores(row: Mapping[str, Any], plane: str, config: Config) -> str:
+    """Why a row of scores lacks a strain that its view shows; empty if it lacks none.
+
+    Parameters
+    ----------
+    row : mapping
+        The results of :func:`.scoring.metrics`, and `failure`.
+    plane : {"short_axis", "long_axis"}
+    config : Config
+        Of the case.
+    """
+    tangential, line = ("e_cc", "gcs") if plane == "short_axis" else ("e_ll", "gls")
+    regional = (f"{part}_pp" for name in ("e_rr", tangential) for part in (f"{name}_rms", f"segment_{name}_error"))
+    shown = np.array([row[name] for name in (*regional, f"{line}_error_pp")], float)
+    return reason(shown, np.array(row["coverage_percent"], float), config, row["failure"])
 
 
 def coarse_grid(config: Config) -> str:

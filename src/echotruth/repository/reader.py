@@ -397,7 +397,8 @@ class Repository:
         """Scores of every clip by every tracker, external ones included: the rows from which the leaderboard is made.
 
         Columns are case, view, size_px, tracker, the metrics of docs/conventions.md, each with its unit in its name,
-        and `failure`: why the tracker failed, or "". There are no rows of a heart of which clips are still missing.
+        `failure`: why the tracker failed, or "", and `no_estimate`: why it lacks a strain that the view shows, or "".
+        There are no rows of a heart of which clips are still missing.
         """
         from echotruth.evaluation.leaderboard import rows
 
