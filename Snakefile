@@ -6,18 +6,20 @@
 The way of a view, of which docs/workflow.md has the picture:
 
     heart -> phantom -> rf -> bmode --+
-      |                               +-> tracking -> repository -> report
-      +----> truth -------------------+
+      |                               |
+      +----> truth -------------------+-> tracking -> repository -> report
+      |                               |
+      +----> points ------------------+
 
 - What a rule makes is a group of the Zarr hierarchy: its output is the `zarr.json` of the group, which is there when
   the group is whole. A job that was killed leaves nothing.
 - A group says in its attributes what it was made with: a hash of the settings and the code of its stage and of all
-  before it. `PLAN.settle` sets aside what was made otherwise, so that Snakemake makes it again. Dates of files say
-  nothing of that, and so what a job reads is `ancient`.
+  before it. Snakemake makes what is missing. What was made otherwise is asked for by the file below TOUCHED that its
+  job makes besides, and a job whose groups stand reads nothing (`PLAN.asked_for`, `PLAN.needed`). Dates of files say
+  nothing, and so all that is read is `ancient`.
 - A heart without a solution is a group too, which says why. What follows it writes groups that say skipped.
 """
 
-import glob
 import sys
 from pathlib import Path
 
@@ -27,6 +29,7 @@ if (Path(workflow.basedir) / "src").is_dir():  # a checkout runs itself, whateve
 from echotruth.config.loading import ConfigError, beside
 from echotruth.workflow import lock, processes
 from echotruth.workflow.plan import Plan
+from echotruth.workflow.status import conclusion
 
 if not config:
 
@@ -35,8 +38,7 @@ if not config:
 
 try:
     PLAN = Plan(beside(config, *workflow.configfiles))
-    PLAN.settle()
-except (ConfigError, lock.LockError, OSError) as error:
+except (ConfigError, OSError) as error:
     sys.exit(f"echotruth: {error}")
 
 OUT, STORE = PLAN.folder.as_posix(), PLAN.store.as_posix()
@@ -44,8 +46,15 @@ HEARTS = list(PLAN.hearts)  # material, fibre angles, loop, disease: all that ma
 CASES = list(PLAN.cases)  # a heart, and how it is imaged: seed of the scatterers, array, realism
 VIEWS = list(PLAN.config.views)  # slices: short axes from base to apex, long axes
 SIZES = list(PLAN.config.bmode.sizes)  # resolutions, px
+TRACKERS = list(PLAN.config.tracking.trackers)
 
+HEART = f"{STORE}/hearts/{{heart}}/zarr.json"
 CLIP = f"{STORE}/clips/{{case}}/{{view}}"  # a case seen in a view
+OF_CLIP = [*expand("truth/{size}", size=SIZES), *expand("bmode/{size}", size=SIZES), "points"]
+OF_CLIP += expand("tracking/{tracker}", tracker=TRACKERS)
+TOUCHED = PLAN.touched  # files that jobs of this run touch
+GROUPS = expand(HEART, heart=HEARTS) + expand(f"{CLIP}/{{group}}/zarr.json", case=CASES, view=VIEWS, group=OF_CLIP)
+GROUPS += expand(f"{STORE}/inference/{{case}}/zarr.json", case=CASES if PLAN.config.inference.tracker else [])
 
 shell.prefix(processes.prefix(Path(workflow.basedir)))  # sets $SCRIPTS and what all processes share
 
@@ -54,13 +63,14 @@ wildcard_constraints:
     heart="[^/]+",
     case="[^/]+",
     view="[^/]+",
-    size="[0-9]+",
+    tracker="[^/]+",
 
 
 include: "rules/mechanics.smk"
 include: "rules/phantom.smk"
 include: "rules/rf.smk"
 include: "rules/truth.smk"
+include: "rules/points.smk"
 include: "rules/bmode.smk"
 include: "rules/tracking.smk"
 include: "rules/inference.smk"
@@ -75,13 +85,24 @@ localrules:
 rule all:
     default_target: True
     input:
-        expand(f"{STORE}/hearts/{{heart}}/zarr.json", heart=HEARTS),
-        expand(f"{CLIP}/truth/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
-        expand(f"{CLIP}/bmode/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
-        expand(f"{CLIP}/tracking/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
+        PLAN.asked_for(GROUPS),
         f"{OUT}/SHA256SUMS",
         f"{OUT}/report.html",
+        PLAN.unpublished,
+        PLAN.unreported,
 
 
 onstart:
-    PLAN.begin()  # writes the configuration of each case
+    try:
+        PLAN.begin()  # writes the configuration of each case
+    except (lock.LockError, OSError) as error:
+        sys.exit(f"echotruth: {error}")
+
+
+onsuccess:
+    PLAN.end()
+    print(*conclusion(PLAN.config, PLAN.folder), sep="\n")  # warnings, and hearts that have no result
+
+
+onerror:
+    PLAN.end()

@@ -12,8 +12,9 @@ truth        the truth of four frames, for all frames
 rf           the full matrix of as many scatterers, evenly spread over the block that they fill, and beamforming; of one
              frame, for all frames
 bmode        images from four frames of noise, for all frames
-tracking     every tracker on a few frames of ejection, there and back, for all frames; the truth at the points, and
-             one score, for all trackers and image sizes
+points       the truth at the points
+tracking     every tracker on a few frames of ejection, there and back, for all frames; and one score, for all trackers
+             and image sizes
 
 To each is added what it takes to round, compress and write what the stage has stored of the view.
 
@@ -41,7 +42,8 @@ from threadpoolctl import threadpool_limits
 
 from echotruth.config import Config
 from echotruth.evaluation.clip import Clip, read_clips
-from echotruth.evaluation.scoring import read_truth, score
+from echotruth.evaluation.points import ground_truth, read_truth
+from echotruth.evaluation.scoring import score
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.beamforming.scanner import validate_scatterers
 from echotruth.imaging.bmode import bmode_clip, pixel_centres, time_gain_compensation
@@ -144,7 +146,8 @@ class Parts:
 
     def writing(self, stage: str) -> float:
         """What it takes to write what is stored of a stage, to another folder."""
-        groups = groups_of(stage, self._config.bmode.sizes)
+        trackers = self._config.tracking.trackers if stage == "tracking" else [None]
+        groups = [name for tracker in trackers for name in groups_of(stage, self._config.bmode.sizes, tracker)]
         arrays = {name: self._repository.arrays(name, *self._place) for name in groups}
         return sum(timed(partial(_write, name, values, self._config)) for name, values in arrays.items())
 
@@ -173,6 +176,10 @@ class Parts:
         gain = time_gain_compensation(config.probe, config.bmode, scanner.range)
         return self._frames / SOME * timed(lambda: bmode_clip(lines, scan, scanner.range, config.bmode, gain))
 
+    def points(self) -> float:
+        kind = self._config.views[self._place[1]].plane
+        return timed(lambda: ground_truth(self._heart, self._plane, kind, self._config).arrays)
+
     def tracking(self) -> float:
         trackers = self._config.tracking.trackers
         excerpts = []
@@ -180,15 +187,13 @@ class Parts:
             part = self._frames // 4 + EXCERPT
             excerpts.append(replace(whole, frames=whole.frames[part], frame_time=whole.frame_time[: len(part)]))
         spent = sum(timed(partial(_try, each, tracker)) for each in excerpts for tracker in trackers.values())
-        return (self._frames - 1) / (len(EXCERPT) - 1) * spent + self._scoring(list(trackers))
+        return (self._frames - 1) / (len(EXCERPT) - 1) * spent + sum(map(self._scoring, trackers))
 
-    def _scoring(self, trackers: list[str]) -> float:
+    def _scoring(self, tracker: str) -> float:
         sizes, true = self._config.bmode.sizes, read_truth(self._repository, *self._place)
-        found = estimates.tracked(self._repository, *self._place, trackers[-1], sizes[0], "displacement")[
-            "displacement"
-        ]
+        found = estimates.tracked(self._repository, *self._place, tracker, sizes[0], "displacement")["displacement"]
         a_score = timed(lambda: score(found, true))
-        return len(sizes) * (timed(lambda: read_truth(self._repository, *self._place)) + len(trackers) * a_score)
+        return timed(lambda: read_truth(self._repository, *self._place)) + len(sizes) * a_score
 
 
 def _write(name: str, values: dict[str, Any], config: Config) -> None:

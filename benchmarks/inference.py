@@ -99,9 +99,8 @@ class Observed(NamedTuple):
 def observed(repository: et.Repository, tracker: str, motions: list[str], sizes: list[int]) -> Iterator[Observed]:
     """What is inferred from: largest images first, then true motion, then the smaller ones."""
     test = [case for case in repository.every.values() if case.labels.get("split") == "test"]
-    cases = [
-        case for case in test if not any(repository.problem(case.id, view, "tracking") for view in repository.views)
-    ]
+    group = f"tracking/{tracker}"
+    cases = [case for case in test if not any(repository.problem(case.id, view, group) for view in repository.views)]
     print(f"{len(cases)} of {len(test)} cases were imaged and tracked", flush=True)
     about = {case.id: (truth(repository, case.id), case.config.pathology.infarct.segments or []) for case in cases}
     largest, *others = repository.sizes

@@ -18,11 +18,13 @@ from echotruth.evaluation.displacement_error import transmural_gradient
 from echotruth.evaluation.polar import resolve
 from echotruth.fem.volume import cell_volumes
 from echotruth.imaging.truth import cavity_centroid
+from echotruth.repository import estimates, schema
 
 if TYPE_CHECKING:
     import echotruth.heart
 
 SLICES = ("base", "mid", "apex")
+SCORES = ("rms_error", "nrmse", "true_segment_displacement", "tracked_segment_displacement")
 UL, UM = 1e-9, 1e-6
 """m^3, m."""
 
@@ -151,8 +153,10 @@ class Heart:
         return float(np.degrees(self.read.read(f"physiology/{name}", self.case)))
 
     def scores(self, view: str, tracker: str, size: int) -> xr.Dataset:
-        """Scores of one clip."""
-        return self.group(f"tracking/{size}", view).sel(tracker=tracker)
+        """Scores of one clip that are compared with those of the paper."""
+        found = estimates.tracked(self.read, self.case, view, tracker, size, *SCORES)
+        arrays = {name: (schema.SCORES[name].dims, values) for name, values in found.items()}
+        return xr.Dataset(arrays, {name: list(schema.LABELS[name]) for name in ("component", "polar")})
 
     def circumferential(
         self, view: str, size: int, tracker: str | None = None, centred: bool = False

@@ -22,8 +22,8 @@ from suite import hearts
 from suite.scores import heart_views, view_clips
 from threadpoolctl import threadpool_limits
 
+from benchmarks.parallel import in_processes
 from echotruth.evaluation.clip import Clip
-from echotruth.evaluation.parallel import in_processes
 from echotruth.tracking import quality
 from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker import tracked_path

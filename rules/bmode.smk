@@ -3,10 +3,10 @@
 
 rule bmode:
     input:
-        heart=ancient(PLAN.heart),
-        rf=ancient(f"{CLIP}/rf/zarr.json"),
+        ancient(PLAN.needed("bmode", HEART, f"{CLIP}/rf/zarr.json")),
     output:
         expand(f"{CLIP}/bmode/{{size}}/zarr.json", size=SIZES, allow_missing=True),
+        temp(touch(f"{TOUCHED}/bmode/{{case}}/{{view}}")),
     log:
         f"{OUT}/logs/bmode/{{case}}/{{view}}.log",
     benchmark:
@@ -19,4 +19,4 @@ rule bmode:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/bmode.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"
+        f'python "$SCRIPTS/bmode.py" {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}'

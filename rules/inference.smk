@@ -1,13 +1,20 @@
 """What a tracker saw of a heart tells of its muscle: asked for only if `inference.tracker` names a tracker."""
 
+READ = ["points", *expand("truth/{size}", size=SIZES), f"tracking/{PLAN.config.inference.tracker}"]
+
 
 rule inference:
     input:
-        heart=ancient(PLAN.heart),
-        truth=ancient(expand(f"{CLIP}/truth/{{size}}/zarr.json", view=VIEWS, size=SIZES, allow_missing=True)),
-        tracking=ancient(expand(f"{CLIP}/tracking/{{size}}/zarr.json", view=VIEWS, size=SIZES, allow_missing=True)),
+        ancient(
+            PLAN.needed(
+                "inference",
+                HEART,
+                *expand(f"{CLIP}/{{group}}/zarr.json", view=VIEWS, group=READ, allow_missing=True),
+            )
+        ),
     output:
         f"{STORE}/inference/{{case}}/zarr.json",
+        temp(touch(f"{TOUCHED}/inference/{{case}}")),
     log:
         f"{OUT}/logs/inference/{{case}}.log",
     benchmark:
@@ -18,4 +25,4 @@ rule inference:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/inference.py {OUT} {{wildcards.case}} &> {{log}}"
+        f'python "$SCRIPTS/inference.py" {OUT} {{wildcards.case}} &> {{log}}'

@@ -2,8 +2,11 @@
 
 
 rule mechanics:
+    input:
+        ancient(PLAN.needed("mechanics")),
     output:
         f"{STORE}/hearts/{{heart}}/zarr.json",
+        temp(touch(f"{TOUCHED}/mechanics/{{heart}}")),
     params:
         case=PLAN.case_of,  # any that has this heart
     log:
@@ -18,4 +21,4 @@ rule mechanics:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/mechanics.py {OUT} {{params.case}} --threads {{threads}} &> {{log}}"
+        f'python "$SCRIPTS/mechanics.py" {OUT} {{params.case}} --threads {{threads}} &> {{log}}'

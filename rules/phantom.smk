@@ -3,9 +3,10 @@
 
 rule phantom:
     input:
-        heart=ancient(PLAN.heart),
+        ancient(PLAN.needed("phantom", HEART)),
     output:
         f"{CLIP}/phantom/zarr.json",
+        temp(touch(f"{TOUCHED}/phantom/{{case}}/{{view}}")),
     log:
         f"{OUT}/logs/phantom/{{case}}/{{view}}.log",
     benchmark:
@@ -18,4 +19,4 @@ rule phantom:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/phantom.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"
+        f'python "$SCRIPTS/phantom.py" {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}'

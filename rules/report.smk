@@ -6,8 +6,7 @@ FIGURES += ["heart", "views", *(["inference"] if PLAN.config.inference.tracker e
 
 rule report:
     input:
-        f"{OUT}/SHA256SUMS",
-        external=sorted(glob.glob(f"{OUT}/external/*.csv")),  # scores of trackers from outside
+        ancient(PLAN.unpublished),
     output:
         report(expand(f"{OUT}/figures/{{name}}.png", name=FIGURES), category="figures"),
         expand(f"{OUT}/figures/{{name}}.svg", name=FIGURES),
@@ -16,6 +15,7 @@ rule report:
         f"{OUT}/figures/leaderboard.csv",
         f"{OUT}/inference.csv" if PLAN.config.inference.tracker else [],
         f"{OUT}/report.html",
+        temp(touch(PLAN.unreported)),
     log:
         f"{OUT}/logs/report.log",
     benchmark:
@@ -27,4 +27,4 @@ rule report:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/report.py {OUT} &> {{log}}"
+        f'python "$SCRIPTS/report.py" {OUT} &> {{log}}'

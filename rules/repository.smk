@@ -3,13 +3,10 @@
 
 rule repository:
     input:
-        hearts=expand(f"{STORE}/hearts/{{heart}}/zarr.json", heart=HEARTS),
-        truth=expand(f"{CLIP}/truth/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
-        bmode=expand(f"{CLIP}/bmode/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
-        tracking=expand(f"{CLIP}/tracking/{{size}}/zarr.json", case=CASES, view=VIEWS, size=SIZES),
-        inference=expand(f"{STORE}/inference/{{case}}/zarr.json", case=CASES) if PLAN.config.inference.tracker else [],
+        ancient([] if PLAN.is_published else PLAN.asked_for(GROUPS)),
     output:
         f"{OUT}/SHA256SUMS",
+        temp(touch(PLAN.unpublished)),
     log:
         f"{OUT}/logs/repository.log",
     benchmark:
@@ -21,4 +18,4 @@ rule repository:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/repository.py {OUT} &> {{log}}"
+        f'python "$SCRIPTS/repository.py" {OUT} &> {{log}}'

@@ -3,10 +3,10 @@
 
 rule rf:
     input:
-        heart=ancient(PLAN.heart),
-        phantom=ancient(f"{CLIP}/phantom/zarr.json"),
+        ancient(PLAN.needed("rf", HEART, f"{CLIP}/phantom/zarr.json")),
     output:
         f"{CLIP}/rf/zarr.json",
+        temp(touch(f"{TOUCHED}/rf/{{case}}/{{view}}")),
     log:
         f"{OUT}/logs/rf/{{case}}/{{view}}.log",
     benchmark:
@@ -19,4 +19,4 @@ rule rf:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/rf.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"
+        f'python "$SCRIPTS/rf.py" {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}'

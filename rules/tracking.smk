@@ -1,17 +1,23 @@
-"""Tracking: every tracker on one clip, scored against the truth."""
+"""Tracking: one tracker on the clips of a view, scored against the truth, in all sizes."""
 
 
 rule tracking:
     input:
-        heart=ancient(PLAN.heart),
-        truth=ancient(f"{CLIP}/truth/{{size}}/zarr.json"),
-        bmode=ancient(f"{CLIP}/bmode/{{size}}/zarr.json"),
+        ancient(
+            PLAN.needed(
+                "tracking",
+                HEART,
+                f"{CLIP}/points/zarr.json",
+                *expand(f"{CLIP}/{{stage}}/{{size}}/zarr.json", stage=["truth", "bmode"], size=SIZES, allow_missing=True),
+            )
+        ),
     output:
-        f"{CLIP}/tracking/{{size}}/zarr.json",
+        f"{CLIP}/tracking/{{tracker}}/zarr.json",
+        temp(touch(f"{TOUCHED}/tracking/{{case}}/{{view}}/{{tracker}}")),
     log:
-        f"{OUT}/logs/tracking/{{case}}/{{view}}/{{size}}.log",
+        f"{OUT}/logs/tracking/{{case}}/{{view}}/{{tracker}}.log",
     benchmark:
-        f"{OUT}/benchmarks/tracking/{{case}}/{{view}}/{{size}}.tsv"
+        f"{OUT}/benchmarks/tracking/{{case}}/{{view}}/{{tracker}}.tsv"
     group:
         "view"
     priority: 5
@@ -20,4 +26,4 @@ rule tracking:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/tracking.py {OUT} {{wildcards.case}} {{wildcards.view}} {{wildcards.size}} &> {{log}}"
+        f'python "$SCRIPTS/tracking.py" {OUT} {{wildcards.case}} {{wildcards.view}} {{wildcards.tracker}} &> {{log}}'

@@ -3,9 +3,10 @@
 
 rule truth:
     input:
-        heart=ancient(PLAN.heart),
+        ancient(PLAN.needed("truth", HEART)),
     output:
         expand(f"{CLIP}/truth/{{size}}/zarr.json", size=SIZES, allow_missing=True),
+        temp(touch(f"{TOUCHED}/truth/{{case}}/{{view}}")),
     log:
         f"{OUT}/logs/truth/{{case}}/{{view}}.log",
     benchmark:
@@ -18,4 +19,4 @@ rule truth:
     conda:
         "../environment.yml"
     shell:
-        f"python $SCRIPTS/truth.py {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}"
+        f'python "$SCRIPTS/truth.py" {OUT} {{wildcards.case}} {{wildcards.view}} &> {{log}}'

@@ -3,11 +3,8 @@
 import numpy as np
 
 from echotruth.cases import Case
-from echotruth.repository import schema
+from echotruth.repository import scores
 from echotruth.repository.reader import Repository
-
-LENGTHS = {"region": 7, "component": 3, "statistic": 3, "polar": 2, "aha": 17, "reference": 3, "wall_component": 3}
-LENGTHS |= {"agreement": 4, "contour": 3}
 
 
 class Board(Repository):
@@ -29,10 +26,10 @@ class Board(Repository):
         self.rows = {case: row for row, case in enumerate(hearts)}
         self._known = {case: Case(case, {}, config) for case in hearts}
 
-    def read(self, path, case, view=None, *index):
-        group, _, name = path.rpartition("/")
-        shape = [LENGTHS[dim] for dim in schema.arrays_of(group)[name].dims[1:]]
-        return np.full(shape, self.hearts[case][view][index[0]])
+    def read(self, path, case, view=None, *size):
+        _, tracker, _ = path.split("/")
+        labels = scores.labels(self.config.loop.frames, self.config.fibres.layers)
+        return np.full(len(labels), self.hearts[case][view][self.trackers.index(tracker)])
 
     def attributes(self, group_name, case="", view=None):
-        return self.about.get((group_name, case, view), {})
+        return {"status": "complete"} | self.about.get((group_name, case, view), {})

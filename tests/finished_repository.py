@@ -14,7 +14,6 @@ from functools import cache
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 
@@ -36,9 +35,11 @@ from echotruth.config import (
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.repository import schema
+from echotruth.repository.checksums import CHECKSUMS, METADATA
 from echotruth.repository.coordinates import coordinates_of
-from echotruth.repository.places import METADATA
-from echotruth.repository.publication import CHECKSUMS, publish
+from echotruth.repository.datasets import source_of
+from echotruth.repository.places import JobPlace, jobs_of
+from echotruth.repository.publication import publish
 from echotruth.workflow import lock
 from echotruth.workflow.job import Job, Result, Work, run
 from echotruth.workflow.plan import Plan
@@ -90,43 +91,33 @@ FINISHED = configured(
 
 def plan_of(folder: Path, config: Config) -> Plan:
     """Plan of the jobs of a repository that may be in any folder."""
-    plan = Plan(config.model_dump())
-    plan.folder = folder
-    return plan
+    return Plan(config.model_dump(), folder=folder)
 
 
 def begin(folder: Path, config: Config) -> list[Case]:
-    """Write what a run writes before its first job, and set aside what is made otherwise; the cases."""
+    """Write what a run writes before its first job; the cases."""
     plan = plan_of(folder, config)
-    with mock.patch.object(lock, "hold", return_value=True):  # which would last until these tests end
-        plan.settle()
+    with lock.held(folder):
         plan.begin()
     return list(plan.cases.values())
 
 
 def jobs(folder: Path, case: Case) -> Iterator[Job]:
     """Jobs of a case, in the order of their stages, that of its heart first."""
-    config = case.config
-    yield Job(folder, "mechanics", case.id)
-    for view in config.views:
-        yield from (Job(folder, stage, case.id, view) for stage in ("phantom", "rf", "truth", "bmode"))
-        yield from (Job(folder, "tracking", case.id, view, size) for size in config.bmode.sizes)
-    if config.inference.tracker:
-        yield Job(folder, "inference", case.id)
+    return (Job(folder, *place) for place in jobs_of(case.id, case.config))
 
 
-def missing(folder: Path, cases: list[Case]) -> Iterator[Job]:
-    """Jobs that Snakemake would run: a group is not there, and is asked for or read by one that is."""
-    for one in (one for case in cases for one in jobs(folder, case)):
-        readers = {"phantom": ("rf", "bmode"), "rf": ("bmode",)}.get(one.stage, ())
-        others = [Job(folder, stage, one.case.id, one.view_name) for stage in readers]
-        if not any(is_made(job) for job in (one, *others)):
-            yield one
-
-
-def is_made(job: Job) -> bool:
-    """Whether the groups of a job are there."""
-    return all((job.store / job._place(name) / METADATA).is_file() for name in job.groups())
+def missing(plan: Plan) -> list[JobPlace]:
+    """Jobs that Snakemake runs: a group is not there or made otherwise, and is asked for or read by a job that runs."""
+    found = []
+    for id, case in plan.cases.items():
+        for place in jobs_of(id, case.config):
+            readers = {"phantom": ("rf", "bmode"), "rf": ("bmode",)}.get(place.stage, ())
+            others = [JobPlace(stage, id, place.view) for stage in readers]
+            is_first = place.stage != "mechanics" or plan.hearts[case.heart] == id
+            if is_first and not any(plan.is_made(one) for one in (place, *others)):
+                found.append(place)
+    return found
 
 
 def blank(job: Job) -> Result:
@@ -139,21 +130,25 @@ def blank(job: Job) -> Result:
         return groups
     if job.stage == "inference":
         return {group: _zeros(group, job.config) for group in schema.INFERENCE}
-    found = {group: _zeros(group, job.config) for group in job.groups()}
-    for group, arrays in found.items():
-        if job.stage == "phantom":
-            arrays |= {"origin": job.plane.origin, "axes": job.plane.axes}
-        elif job.stage == "truth":
-            wall, moves = np.reshape([1, 1, 0], (3, 1, 1)), np.zeros_like(arrays["flow"])
-            moves[0, 0] = moves[-1, 1] = np.nan
-            arrays |= {"labels": arrays["labels"] + wall, "tissue": arrays["tissue"] + 2, "flow": moves}
-        elif job.stage == "bmode":
-            noise = np.random.default_rng([job.config.seed, len(str(job.view_name))])
-            arrays["image"] = noise.integers(256, size=arrays["image"].shape)
-        elif job.stage == "tracking":
-            arrays["wall_axes"] = arrays["wall_axes"] + np.eye(2)
-            found[group] = arrays | {"tracker": list(job.config.tracking.trackers)}
-    return found
+    return {group: seen(job, _zeros(group, job.config)) for group in job.groups()}
+
+
+def seen(job: Job, arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Arrays of a group of a view, of which some are not nought."""
+    if job.stage == "phantom":
+        return arrays | {"origin": job.plane.origin, "axes": job.plane.axes}
+    if job.stage == "truth":
+        job.notes |= source_of(job.solved, job.plane)
+        wall, moves = np.reshape([1, 1, 0], (3, 1, 1)), np.zeros_like(arrays["flow"])
+        moves[0, 0] = moves[-1, 1] = np.nan
+        return arrays | {"labels": arrays["labels"] + wall, "tissue": arrays["tissue"] + 2, "flow": moves}
+    if job.stage == "bmode":
+        noise = np.random.default_rng([job.config.seed, len(str(job.view_name))])
+        return {"image": noise.integers(256, size=arrays["image"].shape)}
+    if job.stage == "points":
+        ones = {name: arrays[name] + 1 for name in ("layer", "segment")}
+        return arrays | ones | {"wall_axes": arrays["wall_axes"] + np.eye(2)}
+    return arrays
 
 
 def solved(job: Job) -> Result:
@@ -168,14 +163,14 @@ def do(job: Job, result: Work = blank) -> None:
 
 def remake(folder: Path, config: Config, result: Work = blank) -> list[str]:
     """Make what is missing or was made otherwise, as a run does; the jobs that were done, as `rf 1 mid`."""
-    cases, done = begin(folder, config), []
-    for one in missing(folder, cases):
-        do(one, result)
-        done.append(" ".join(str(part) for part in (one.stage, one.case.id, one.view_name, one.size) if part))
-    if done or not (folder / CHECKSUMS).is_file():
-        publish(folder, config, cases)
-        done.append("repository")
-    return done
+    plan = plan_of(folder, config)
+    done, was_published = missing(plan), plan.is_published
+    cases = begin(folder, config)
+    for place in done:
+        do(Job(folder, *place), result)
+    if not was_published:
+        publish(folder, plan.config, cases)
+    return [" ".join(filter(None, place)) for place in done] + ["repository"] * (not was_published)
 
 
 def finish(folder: Path, config: Config, result: Work = blank) -> Path:
@@ -210,7 +205,7 @@ def _moved(config: str) -> tuple[Result, dict[str, float]]:
 
 def _zeros(group: str, config: Config) -> dict[str, np.ndarray]:
     lengths = {name: np.size(values) for name, values in coordinates_of(group, config).items()}
-    lengths |= {"tracker": len(config.tracking.trackers), "line": config.rf.lines, "range": DEPTHS}
+    lengths |= {"line": config.rf.lines, "range": DEPTHS, "end": 2}
     arrays = [array for array in schema.arrays_of(group).values() if not array.name.startswith(OPTIONAL)]
     shapes = {array.name: [lengths.get(dim, 1) for dim in array.dims] for array in arrays}
     lines = {"range": 1e-3 * np.arange(DEPTHS), "line_angle": np.zeros(config.rf.lines)} if group == "rf" else {}

@@ -16,7 +16,6 @@ from echotruth.imaging.labels import unpack
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
-from echotruth.repository import schema
 from echotruth.workflow.job import Job, Result
 
 SIZES = (128, 64)
@@ -66,7 +65,6 @@ TRUE = {
     "true_rotation": 0.15,
 }
 """Of the three references, told apart by their values."""
-TRACKED = schema.arrays_of("tracking/SIZE")
 
 
 @dataclass(eq=False)
@@ -98,9 +96,8 @@ class Known:
 
     def arrays(self, job: Job) -> Result:
         """Known arrays of a job, by group."""
-        size = job.size or SIZES[0]
-        if job.stage == "tracking":
-            return {f"tracking/{size}": TRUE | {name: each_tracker(name) for name in FOUND["one"]}}
+        if job.stage in ("points", "tracking"):
+            return {group: TRUE if job.tracker is None else FOUND[job.tracker] for group in job.groups()}
         if job.stage == "truth":
             return {f"truth/{size}": self.truth(job.view_name, size) for size in job.config.bmode.sizes}
         return {f"bmode/{size}": {"image": known_images(size)} for size in job.config.bmode.sizes}
@@ -109,11 +106,6 @@ class Known:
     def truth(self, view: str, size: int) -> dict[str, np.ndarray]:
         plane, pixels = self.plane(view), pixel_centres(self.config.bmode, size)
         return pixel_truth(self.heart, plane, *pixels, TissueImages(self.config, self.heart, plane, *pixels))
-
-
-def each_tracker(name: str) -> np.ndarray:
-    """What the trackers found of an array, one value each, with its dimensions."""
-    return np.reshape([found[name] for found in FOUND.values()], (-1, *[1] * (len(TRACKED[name].dims) - 1)))
 
 
 def known_images(size: int) -> np.ndarray:
@@ -130,13 +122,13 @@ def known_at(folder: Path, settings: dict) -> Known:
     return Known(folder, et.configure(settings), et.beat(et.configure(settings, cases={}), progress=False))
 
 
-def make(folder: Path, settings: dict, **tracking: np.ndarray) -> Known:
-    """Write a repository as the workflow does, with known images, and other arrays of tracking if they are given."""
+def make(folder: Path, settings: dict, **changed: np.ndarray) -> Known:
+    """Write a repository as the workflow does, with known images, and other arrays of any name if they are given."""
     known = known_at(folder, settings)
 
     def result(job: Job) -> Result:
         arrays = known.arrays(job)
-        return overlaid(job, {name: values | tracking for name, values in arrays.items()})
+        return overlaid(job, {name: values | changed for name, values in arrays.items()})
 
     finished_repository.finish(folder, known.config, result)
     return known

@@ -296,7 +296,7 @@ def test_repeated_frame_and_lengths_for_another_heart_are_told(clip):
     ("call", "error", "words"),
     [
         (lambda heart, clip: et.image(heart, "front"), ValueError, "view = 'front': use one of mid"),
-        (lambda heart, clip: et.track(clip, "dic"), ConfigError, "method = 'dic': should be"),
+        (lambda heart, clip: et.track(clip, "dic"), ConfigError, "dic: is not a tracker: did you mean dis"),
         (lambda heart, clip: et.track(clip, "dis", window=3), ConfigError, "window is not a key"),
         (lambda heart, clip: et.configure(geometry={"preset": "cat"}), ConfigError, "geometry.preset = 'cat'"),
         (

@@ -140,7 +140,7 @@ def test_heart_at_rest_has_no_frequency_by_default(heart, clip):
     still = et.beat({**TUBE, "motion": at_rest}, progress=False)
     with pytest.raises(ValueError, match="made of another heart"):
         et.velocity(still, clip, [1])
-    of_still = clip.assign_attrs(heart=fingerprint(still), config=still.config.model_dump_json())
+    of_still = clip.assign_attrs(motion=fingerprint(still), config=still.config.model_dump_json())
     with pytest.raises(ValueError, match="No wall in this view moves along the beam"):
         et.velocity(still, of_still, [1])
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import cores
 import yaml
 from finished_repository import finish, solved
 
@@ -38,12 +37,11 @@ def alone(folder: Path) -> Path:
 
 
 class Workspace:
-    """Folder with the configuration `tiny`; processes that run in it share the compiled functions of the tests."""
+    """Folder with the configuration `tiny`."""
 
     def __init__(self, folder: Path, config: str = CONFIG) -> None:
         self.folder, self.out = folder, folder / "out/tiny"
         folder.mkdir(exist_ok=True)
-        cores.lend(folder / ".snakemake/numba")
         (folder / "tiny.yaml").write_text(config)
 
     def start(self, *command: str) -> subprocess.Popen[str]:

@@ -24,8 +24,9 @@ from echotruth.heart import Heart
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.physiology import measured_heart
+from echotruth.repository.code import PACKAGE
 from echotruth.repository.datasets import as_stored
-from echotruth.repository.version import PACKAGE, settings_hash, version_of
+from echotruth.repository.version import Versions, settings_hash
 from echotruth.section import value_of
 
 SEED, HEARTS_OF_PART, ATTEMPTS = 2, 8, 20
@@ -264,7 +265,12 @@ def _planned(split: str, species: str) -> Iterable[dict[str, Any]]:
 def suite_version() -> str:
     """Hash of the code that decides the numbers, and of the configurations of all hearts at their first attempt."""
     configs = [one.case.config for row in plan() for one in cases_of(row, 1)]
-    versions = (version_of("tracking", config, view) for config in configs for view in config.views)
+    versions = [
+        of_case.of("tracking", view, tracker)
+        for config, of_case in ((config, Versions(config)) for config in configs)
+        for view in config.views
+        for tracker in config.tracking.trackers
+    ]
     return settings_hash(*(sha256(file.read_bytes()).hexdigest() for file in FILES), *versions)
 
 

@@ -17,10 +17,10 @@ from typing import Any
 
 import pandas as pd
 
+from benchmarks.parallel import in_processes
 from echotruth import files
 from echotruth.config.loading import read_yaml
 from echotruth.evaluation.leaderboard import RANKED_BY
-from echotruth.evaluation.parallel import in_processes
 
 from .columns import ABOUT, HASHES, IDENTITY, TEXT
 from .hearts import plan, suite_version

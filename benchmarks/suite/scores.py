@@ -24,7 +24,8 @@ from echotruth.evaluation.clip import Clip, make_clip
 from echotruth.evaluation.clip_metrics import ClipTruth, clip_rows
 from echotruth.evaluation.curves import REFERENCE
 from echotruth.evaluation.point_tracks import SIDE
-from echotruth.evaluation.scoring import Truth, estimated, ground_truth, scored_estimate
+from echotruth.evaluation.points import Truth, ground_truth
+from echotruth.evaluation.scoring import estimated, scored_estimate
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.labels import unpack
@@ -89,15 +90,19 @@ def view_rows(one: SuiteCase, heart: Heart, view: str) -> Iterator[Row]:
             began = _cpu_time()
             estimate, failure = estimated(clip, settings)
             own = {"tracker": name, "failure": failure, "cpu_s": _cpu_time() - began}
-            arrays = {key: values[None] for key, values in scored_estimate(clip, truth, estimate).items()}
-            stored = as_stored(case, {"tracking/SIZE": arrays})["tracking/SIZE"]
-            tracked = {key: values[0] for key, values in stored.items()}
+            found = scored_estimate(clip, truth, estimate)
+            tracked = found | as_stored(case, {"tracking/TRACKER": found})["tracking/TRACKER"]
             row, segments, steps = clip_rows(tracked, points)
             turned = truth.courses["rotation"][truth.es], tracked["tracked_rotation"][truth.es]
             row |= dict(zip(ROTATION, np.degrees(turned), strict=True))
-            tracking = config.tracking.model_copy(update={"trackers": {name: settings}})
-            version = version_of("tracking", config.model_copy(update={"tracking": tracking}), view)
-            yield keys | own | {"configuration": version} | row | packed_segments(segments) | packed_reliability(steps)
+            yield (
+                keys
+                | own
+                | {"configuration": version_of("tracking", config, view, name)}
+                | row
+                | packed_segments(segments)
+                | packed_reliability(steps)
+            )
 
 
 def view_clips(case: Case, heart: Heart, view: str) -> tuple[Truth, Labels, list[Clip]]:

@@ -64,7 +64,7 @@ def test_command_alone_prints_what_there_is(call):
         (["evaluate", "out/demo", "--trakcer=dis"], "one of the arguments --tracker --onnx --command is required"),
         (["export", "out/demo", "--format", "mp5"], "--format = mp5: did you mean mp4?"),
         (["export", "out/demo", "--format", "mp4", "--rate", "fast"], "argument --rate: invalid float value: 'fast'"),
-        (["evaluate", "out/demo", "--tracker", "dis", "--size", "5.1"], "argument --size: invalid int value: '5.1'"),
+        (["evaluate", "out/demo", "--tracker", "dis", "--jobs", "5.1"], "argument --jobs: invalid int value: '5.1'"),
         (["check"], "the following arguments are required"),
         (["completion", "bsh"], "shell = bsh: did you mean bash?"),
     ],

@@ -40,13 +40,11 @@ def test_installation_is_told(call):
 
 @pytest.mark.slow
 def test_repository_is_told_and_opens_as_it_says(call, finished):
-    (finished / "external").mkdir(exist_ok=True)
-    (finished / "external/mine.csv").write_text("case\n")
     status, output, errors = call("info", finished)
     found = told(output)
     assert (status, errors) == (0, "")
     assert (found["cases"], found["views"], found["trackers"]) == ("3: 3 complete", "1: mid (short axis)", "one")
-    assert found["sizes"].startswith("64 px") and found["from outside"] == "mine" and found["name"] == "small, seed 1"
+    assert found["sizes"].startswith("64 px") and found["name"] == "small, seed 1"
     files = [path for path in finished.rglob("*") if path.is_file()]
     assert f"{sum(path.stat().st_size for path in files) / 2**20:.1f} MiB in {len(files)} files" == found["on disk"]
 
@@ -66,7 +64,7 @@ def test_repository_that_no_run_has_published_is_told_so(call, tmp_path):
     status, output, _ = call("info", "small")
     found = told(output)
     assert status == 0 and found["cases"] == "3: 3 unfinished" and "not published" in found["made by"]
-    assert "et.Repository" not in output
+    assert 'repository = et.Repository("small")' in output and "clip" not in output
 
 
 @pytest.mark.parametrize(

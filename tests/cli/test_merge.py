@@ -22,7 +22,7 @@ def sources(tmp_path_factory):
 
 @pytest.fixture
 def both(tmp_path, monkeypatch):
-    monkeypatch.setattr(lock, "hold", lambda folder: True)  # which would last until these tests end
+    monkeypatch.setattr(lock, "hold", lambda folder: False)  # which would last until these tests end
     (tmp_path / "both.yaml").write_text(yaml.safe_dump(BOTH.model_dump(mode="json")))
 
 

@@ -23,7 +23,7 @@ def demo(tmp_path_factory):
         cases={},
         bmode=Bmode(size_px=128, downsampling=(1,)),
         rf=Rf(lines=24, focal_zones=1),
-        tracking=Tracking(grid_px=4, trackers={"dis": {"method": "dis"}, "bspline_dic": {"method": "bspline_dic"}}),
+        tracking=Tracking(grid=0.03, trackers={"dis": {"method": "dis"}, "bspline_dic": {"method": "bspline_dic"}}),
         geometry=Geometry(circumferential_elements=12, longitudinal_elements=6, transmural_elements=1),
     ).model_copy(update={"views": planes})
     learning_repository.make(folder / "out/demo", config)

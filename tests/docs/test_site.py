@@ -10,7 +10,6 @@ from html import unescape
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-import cores
 import pytest
 
 import echotruth as et
@@ -32,7 +31,6 @@ def site(tmp_path_factory):
         shutil.copytree(ROOT / name, source / name, ignore=MADE)
     for page in [*ROOT.glob("*.md"), ROOT / "CITATION.cff"]:
         shutil.copy(page, source)
-    cores.lend(source / "docs/notebooks/.snakemake/numba")
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-b", "html", "-c", "docs", ".", "built"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(

@@ -12,10 +12,10 @@ from PIL import Image
 import echotruth as et
 from echotruth.cli import main
 from echotruth.cli.track import TRACKERS
+from echotruth.config.tracking import BUILTIN
 from echotruth.echo import page
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import write_wall
-from echotruth.evaluation.tracker_options import BUILTIN
 from echotruth.sharing.export import Export, Selection
 
 MIDDLE = (ENDO + EPI) / 2
@@ -224,7 +224,10 @@ def test_command_refuses_what_cannot_be(ring, tmp_path, monkeypatch, capsys):
         ([clip, clip, "--view", "mid"], "one.npy: has the name of"),
         ([clip, "--view", "mid"], "one.wall.csv: is not there: draw the wall"),
         ([clip, "--view", "mid", "--wall", wall], "frame to frame: give --spacing-mm and --frame-time-ms\n"),
-        ([clip, "--view", "mid", "--wall", wall, *scale, "--tracker", "diss"], "--tracker diss: did you mean dis?"),
+        (
+            [clip, "--view", "mid", "--wall", wall, *scale, "--tracker", "diss"],
+            "diss: is not a tracker: did you mean dis?",
+        ),
         ([clip, "--view", "mid", "--wall", wall, *scale, "--onnx", "none.onnx"], "none.onnx: is not there: give the"),
         ([clip, clip.with_name("two.npy"), "--view", "mid", "--wall", wall], "suits one clip"),
     ):

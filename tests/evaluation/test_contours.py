@@ -9,7 +9,7 @@ from scipy.special import ellipe
 import echotruth as et
 from echotruth.config import View
 from echotruth.evaluation.contours import Contours, contours
-from echotruth.evaluation.scoring import truth_at
+from echotruth.evaluation.points import truth_at
 from echotruth.heart import Heart
 from echotruth.imaging.view import imaging_plane
 from echotruth.mechanics.fibres import wall_depth

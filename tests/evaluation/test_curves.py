@@ -37,11 +37,10 @@ def result(job, known):
     if job.stage == "mechanics":
         return arrays | {"mechanics": arrays["mechanics"] | {"es_frame": ES}}
     if job.stage == "tracking":
-        factor = 0.5 ** SIZES.index(job.size)
-        found = [tracked(job.view_name, name, factor) for name in FACTOR]
-        arrays[f"tracking/{job.size}"] |= true(job.view_name) | {
-            name: np.stack([one[name] for one in found]) for name in found[0]
-        }
+        found = [tracked(job.view_name, job.tracker, 0.5**k) for k in range(len(SIZES))]
+        arrays[f"tracking/{job.tracker}"] |= {name: np.stack([one[name] for one in found]) for name in found[0]}
+    if job.stage == "points":
+        arrays["points"] |= true(job.view_name)
     return arrays
 
 

@@ -142,27 +142,17 @@ def test_a_repository_whose_hearts_are_not_finished_has_no_rows(tmp_path):
 
 
 def test_a_failure_is_told_beside_the_scores(tmp_path):
-    about = {("tracking/64", "b", "mid"): {"failures": {"two": "no motion found"}}}
+    about = {("tracking/two", "b", "mid"): {"failures": {"64": "no motion found"}}}
     table = rows(board(tmp_path, about=about))
     assert list(table[table["failure"] != ""][["case", "view", "tracker"]].iloc[0]) == ["b", "mid", "two"]
     assert overall(standings(table, 1)).loc["two", "failures"] == 1
 
 
-def test_external_trackers_stand_beside_the_others_on_the_clips_that_count(tmp_path):
-    (tmp_path / "external").mkdir()
-    own, read = rows(board(tmp_path)), board(tmp_path)
-    clips = [read.version(case, view) for case in "abc" for view in CONFIG.views]
-    external = own[own["tracker"] == "one"].assign(tracker="mine", nrmse_all_percent=1.0, failure=np.nan, clip=clips)
-    external.to_csv(tmp_path / "external/mine.csv", index=False)
-    own.assign(nrmse_all_percent=0.0).to_csv(tmp_path / "external/one.csv", index=False)
-    table = rows(board(tmp_path, "ab"))
-    assert len(table) == 12 and set(table["case"]) == {"a", "b"}
-    assert best(standings(table, 1)) == ["mine", "one", "two"]
-    assert (table["failure"] == "").all()
-
-
-def test_a_table_of_an_external_tracker_without_a_column_is_refused(tmp_path):
-    (tmp_path / "external").mkdir()
-    pd.DataFrame({"case": ["a"]}).to_csv(tmp_path / "external/mine.csv", index=False)
-    with pytest.raises(ValueError, match=r"mine\.csv: has no column view: evaluate that tracker again"):
-        rows(board(tmp_path))
+def test_tracker_that_was_run_on_some_clips_alone_has_no_rows_of_the_others_and_no_rank(tmp_path):
+    about = {("tracking/two", case, "mid"): {"status": "unfinished"} for case in "ab"}
+    table = rows(board(tmp_path, about=about))
+    of_two = table[table["tracker"] == "two"]
+    assert list(of_two[["case", "view"]].itertuples(index=False, name=None)) == [
+        ("a", "long_axis"), ("b", "long_axis"), ("c", "mid"), ("c", "long_axis")
+    ]  # fmt: skip
+    assert best(standings(table, 1)) == ["one", "two"] and np.isnan(overall(standings(table, 1)).loc["two", "rank"])

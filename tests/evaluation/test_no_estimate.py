@@ -9,6 +9,7 @@ import echotruth as et
 from echotruth.config import Bmode, Config, PhaseCorrelation, Tracking
 from echotruth.evaluation.no_estimate import LOST, NOT_SHOWN, reason
 from echotruth.report.account import failures
+from echotruth.repository import scores
 from echotruth.viewer.choice import first
 from echotruth.viewer.page import Page
 
@@ -29,10 +30,12 @@ def test_reasons_in_the_order_in_which_they_hold():
 def unknown_strain(job):
     """All results of a job, in which trackers have found no strain."""
     found = finished.blank(job)
-    for group, arrays in found.items():
-        if group.startswith("tracking/"):
-            for name in ("tracked_region_strain", "tracked_segment_strain", "tracked_line_strain", "strain_rms"):
-                arrays[name] = np.full(arrays[name].shape, np.nan)
+    if job.stage == "tracking":
+        arrays = found[f"tracking/{job.tracker}"]
+        for name in ("tracked_region_strain", "tracked_segment_strain", "tracked_line_strain"):
+            arrays[name] = np.full(arrays[name].shape, np.nan)
+        labels = scores.labels(job.config.loop.frames, job.config.fibres.layers)
+        arrays["scores"][:, [label.startswith("strain_rms") for label in labels]] = np.nan
     return found
 
 

@@ -6,12 +6,13 @@ import finished_repository
 import numpy as np
 import pytest
 
+from benchmarks.difficulty.floors import difficulty
 from echotruth.cases import expand
 from echotruth.config import Config, Motion, View
 from echotruth.config.imaging import Excursion, ViewMotion
 from echotruth.config.motion import Rigid
-from echotruth.evaluation.difficulty.floors import difficulty
-from echotruth.evaluation.scoring import ground_truth, read_truth, score
+from echotruth.evaluation.points import ground_truth, read_truth
+from echotruth.evaluation.scoring import score
 from echotruth.fem.location import locate
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.surroundings import SurroundingsMotion, outside_heart

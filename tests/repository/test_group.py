@@ -2,8 +2,10 @@
 
 import errno
 import json
+import os
 import shutil
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from finished_repository import configured
 from echotruth.config import Bmode, Tracking
 from echotruth.repository import group, rounding, schema
 from echotruth.repository.coordinates import coordinates_of
-from echotruth.repository.group import NotWritten
+from echotruth.repository.group import ChecksumError, NotWritten
 from echotruth.repository.places import group_of, place
 
 CONFIG = configured(tracking=Tracking(grid=0.03, trackers={name: {"method": "dis"} for name in ("one", "two")}))
@@ -24,14 +26,14 @@ ABOUT = {"status": "complete", "version": "1"}
 
 def values(name):
     """Random values of all arrays of a group whose dimensions have a length in this configuration."""
-    lengths = {one: np.size(value) for one, value in coordinates_of(name, CONFIG).items()} | {"tracker": 2, "node": 7}
+    lengths = {one: np.size(value) for one, value in coordinates_of(name, CONFIG).items()} | {"node": 7}
     random = np.random.default_rng(len(name))
     arrays = [array for array in schema.arrays_of(name).values() if lengths.keys() >= set(array.dims)]
     return {array.name: random.integers(0, 9, [lengths[dim] for dim in array.dims]) / 8 for array in arrays}
 
 
 def write(name, given, folder):
-    group.write(folder, name, given, coordinates_of(name, CONFIG) | {"tracker": ["one", "two"]}, CONFIG, ABOUT)
+    group.write(folder, name, given, coordinates_of(name, CONFIG), CONFIG, ABOUT)
 
 
 def path(name):
@@ -45,7 +47,7 @@ def made(store, name, given=None):
     return given
 
 
-@pytest.mark.parametrize("name", ["mechanics", "physiology", f"truth/{SIZE}", f"bmode/{SIZE}", f"tracking/{SIZE}"])
+@pytest.mark.parametrize("name", ["mechanics", "physiology", f"truth/{SIZE}", f"bmode/{SIZE}", "tracking/one"])
 def test_what_is_written_reads_back_rounded_to_the_quantum_that_its_metadata_state(tmp_path, name):
     given = made(tmp_path / "a.zarr", name)
     found = group.read(tmp_path / "a.zarr", path(name))
@@ -59,20 +61,24 @@ def test_what_is_written_reads_back_rounded_to_the_quantum_that_its_metadata_sta
 
 
 def test_xarray_finds_dimensions_coordinates_units_and_meaning(tmp_path):
-    made(tmp_path / "a.zarr", f"tracking/{SIZE}")
-    with xr.open_zarr(tmp_path / "a.zarr", group=path(f"tracking/{SIZE}"), consolidated=False) as opened:
-        assert opened["displacement"].dims == ("tracker", "frame", "axial", "lateral", "plane")
-        assert list(opened["tracker"].values) == ["one", "two"] and opened["time"].dims == ("frame",)
-        for name, array in schema.arrays_of(f"tracking/{SIZE}").items():
+    made(tmp_path / "a.zarr", "tracking/one")
+    with xr.open_zarr(tmp_path / "a.zarr", group=path("tracking/one"), consolidated=False) as opened:
+        assert opened["displacement"].dims == ("size", "frame", "axial", "lateral", "plane")
+        assert (
+            list(opened["size"].values) == [SIZE]
+            and "nrmse 0 total" in opened["score"].values
+            and opened["time"].dims == ("frame",)
+        )
+        for name, array in schema.arrays_of("tracking/one").items():
             assert opened[name].attrs["units"] == array.units and opened[name].attrs["long_name"] == array.long_name
 
 
-def test_chunk_is_one_component_of_one_frame_or_of_the_cycle_that_one_tracker_found(tmp_path):
+def test_chunk_is_one_component_of_one_frame_or_of_the_cycle_of_one_size(tmp_path):
     made(tmp_path / "a.zarr", f"truth/{SIZE}")
-    made(tmp_path / "a.zarr", f"tracking/{SIZE}")
+    made(tmp_path / "a.zarr", "tracking/one")
     strain, tracked = (
         zarr.open_array(tmp_path / "a.zarr", path=path(name), mode="r")
-        for name in (f"truth/{SIZE}/strain", f"tracking/{SIZE}/displacement")
+        for name in (f"truth/{SIZE}/strain", "tracking/one/displacement")
     )
     assert strain.chunks == (1, SIZE, SIZE, 1)
     assert tracked.chunks == (1, *tracked.shape[1:4], 1) and tracked.shards == tracked.shape
@@ -81,14 +87,14 @@ def test_chunk_is_one_component_of_one_frame_or_of_the_cycle_that_one_tracker_fo
 
 
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.99])
-@pytest.mark.parametrize(("name", "array"), [(f"truth/{SIZE}", "strain"), ("mechanics", "pressure")])
+@pytest.mark.parametrize(("name", "array"), [(f"truth/{SIZE}", "strain"), ("points", "true_rotation")])
 def test_flipped_bit_is_an_error_and_not_a_wrong_number(tmp_path, name, array, share):
     made(tmp_path / "a.zarr", name)
     (file,) = [one for one in (tmp_path / "a.zarr" / path(name) / array / "c").rglob("*") if one.is_file()]
     content = bytearray(file.read_bytes())
     content[int(share * len(content))] ^= 4
     file.write_bytes(content)
-    with pytest.raises(Exception, match=r"(?i)checksum|crc"):
+    with pytest.raises(Exception, match=r"is not what was written: `echotruth check`"):
         group.read(tmp_path / "a.zarr", path(name))
 
 
@@ -144,7 +150,7 @@ def test_quantum_of_lengths_is_the_power_of_two_below_a_256th_of_the_finest_pixe
     assert quantum <= finest / 256 < 2 * quantum and np.frexp(quantum)[0] == 0.5
 
 
-@pytest.mark.parametrize("name", ["mechanics", f"truth/{SIZE}", f"bmode/{SIZE}"])
+@pytest.mark.parametrize("name", ["points", f"truth/{SIZE}", f"bmode/{SIZE}"])
 def test_lost_file_is_an_error_and_not_fill(tmp_path, name):
     """What holds fill values alone is none."""
     given = made(tmp_path / "a.zarr", name, {key: np.zeros_like(value) for key, value in values(name).items()})
@@ -152,5 +158,65 @@ def test_lost_file_is_an_error_and_not_fill(tmp_path, name):
     for key in given:
         shutil.rmtree(tmp_path / "a.zarr" / path(name) / key / "c", ignore_errors=True)
         (tmp_path / "a.zarr" / path(name) / key / "c").unlink(missing_ok=True)
-        with pytest.raises(NotWritten, match=rf"{key}: its data are lost: delete the group"):
+        array = zarr.open_array(tmp_path / "a.zarr", path=f"{path(name)}/{key}", mode="r")
+        with pytest.raises(ChecksumError, match=rf"{key} has lost its data: `echotruth check`"):
+            group.part(array)
+        with pytest.raises(ChecksumError, match=r"is not what was written: `echotruth check` of the repository names"):
             group.read(tmp_path / "a.zarr", path(name), key)
+
+
+def cut(file):
+    os.truncate(file, file.stat().st_size // 2)
+
+
+def zero(file):
+    file.write_bytes(bytes(file.stat().st_size))
+
+
+@pytest.mark.parametrize("harm", [lambda file: os.truncate(file, 0), cut, zero, os.unlink])
+@pytest.mark.parametrize("name", ["mechanics", "points", f"truth/{SIZE}", f"bmode/{SIZE}", "tracking/one"])
+def test_file_that_is_emptied_cut_zeroed_or_lost_is_an_error_also_where_a_part_is_read(tmp_path, name, harm):
+    """The files of the groups that hold shards; a power cut leaves a length of 0."""
+    for key in made(tmp_path / "a.zarr", name):
+        (file,) = [one for one in (tmp_path / "a.zarr" / path(name) / key).rglob("c*/**/*") if one.is_file()] or [
+            tmp_path / "a.zarr" / path(name) / key / "c"
+        ]
+        before = file.read_bytes()
+        harm(file)
+        array = zarr.open_array(tmp_path / "a.zarr", path=f"{path(name)}/{key}", mode="r")
+        for index in ((), (0,) * min(array.ndim, 1)):
+            with pytest.raises(ChecksumError, match=rf"{key} .*`echotruth check`"):
+                group.part(array, *index)
+        with pytest.raises(ChecksumError, match="`echotruth check`"):
+            group.read(tmp_path / "a.zarr", path(name), key)
+        file.write_bytes(before)
+
+
+def test_exchanged_files_are_an_error_where_whole_arrays_are_read(tmp_path):
+    store, name = tmp_path / "a.zarr", f"bmode/{SIZE}"
+    places = [place(name, "a", "a", view) for view in ("mid", "apex")]
+    for number, where in enumerate(places):
+        image = np.full((3, SIZE, SIZE), number)
+        group.write_groups(store, {where: partial(write, name, {"image": image})})
+    one, other = (store / where / "image/c/0/0/0" for where in places)
+    first, second = one.read_bytes(), other.read_bytes()
+    one.write_bytes(second)
+    other.write_bytes(first)
+    for where in places:
+        with pytest.raises(ChecksumError, match=r"image/c/0/0/0 is not what was written: `echotruth check`"):
+            group.read(store, where, "image")
+
+
+def test_files_are_on_the_disk_before_a_group_is_moved_to_its_place(tmp_path, monkeypatch):
+    synced, fsync, store = set(), os.fsync, tmp_path / "a.zarr"
+    monkeypatch.setattr(os, "fsync", lambda number: synced.add(os.readlink(f"/proc/self/fd/{number}")) or fsync(number))
+    replace = Path.replace
+
+    def checked(draft, target):
+        if draft.is_dir():
+            assert {str(one) for one in draft.rglob("*")} | {str(draft)} <= synced
+        return replace(draft, target)
+
+    monkeypatch.setattr(Path, "replace", checked)
+    made(store, "mechanics")
+    assert str((store / path("mechanics")).parent) in synced

@@ -80,7 +80,6 @@ def test_version_is_that_of_the_section_and_of_all_that_was_tracked():
     trackers = {name: PhaseCorrelation(window_px=16) for name in ("one", "two")}
     others = [
         finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="two")),
-        finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="one")),
         finished.configured(motion=Motion(), views=("mid",), inference=Inference(tracker="one")),
         finished.configured(motion=Motion(), inference=Inference(tracker="one", size_px=finished.SIZE)),
         finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": [75, 3]})),
@@ -88,6 +87,9 @@ def test_version_is_that_of_the_section_and_of_all_that_was_tracked():
     ]
     hashes = [version_of("inference", config) for config in (CONFIG, *others)]
     assert len(set(hashes)) == len(hashes)
+    two = CONFIG.tracking.model_copy(update={"trackers": CONFIG.tracking.trackers | {"two": trackers["two"]}})
+    further = CONFIG.model_copy(update={"tracking": two})
+    assert version_of("inference", further) == hashes[0], "what another tracker finds is not read"
     assert len({version_of("mechanics", config) for config in (CONFIG, *others)}) == 1
 
 

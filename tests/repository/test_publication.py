@@ -64,7 +64,7 @@ def test_store_opens_as_a_tree_from_its_root_and_from_each_heart_and_clip(done):
 @pytest.mark.parametrize("case", ["two", "three"])
 def test_groups_of_a_heart_that_is_not_imaged_say_skipped_and_why(done, case):
     repository = et.Repository(done)
-    for name in ("phantom", "rf", "truth/64", "bmode/64", "tracking/64"):
+    for name in ("phantom", "rf", "truth/64", "bmode/64", "points", "tracking/one"):
         found = repository.attributes(name, case, "mid")
         assert found["status"] == "skipped" and found["reason"] == repository.cases.loc[case, "reason"], name
     assert repository.attributes("heart", "three")["status"] == "failed"
@@ -75,7 +75,8 @@ def test_groups_of_a_heart_that_is_not_imaged_say_skipped_and_why(done, case):
 def test_a_wider_bound_images_what_it_decides_otherwise_and_nothing_else(folder):
     before = content(folder)
     made = remake(folder, changed(physiology=Physiology(longitudinal_strain_max=0.1)), result)
-    stages = ["phantom two mid", "rf two mid", "truth two mid", "bmode two mid", "tracking two mid 64"]
+    stages = ["phantom two mid", "rf two mid", "truth two mid", "bmode two mid", "points two mid"]
+    stages.append("tracking two mid one")
     assert made == [*stages, "repository"]
     after = content(folder)
     kept = [name for name in before if name.startswith(("small.zarr/hearts", "small.zarr/clips/one"))]
@@ -102,7 +103,7 @@ def test_reader_judges_each_heart_by_its_own_findings(tmp_path, swept, statuses)
 
 def test_implausible_hearts_are_imaged_if_the_configuration_says_so(folder):
     made = remake(folder, changed(physiology=Physiology(exclude_implausible=False)), result)
-    assert len(made) == 6 and all(" two " in name for name in made[:-1])
+    assert len(made) == 7 and all(" two " in name for name in made[:-1])
     assert list(et.Repository(folder).cases["status"]) == ["complete", "implausible", "failed"]
 
 

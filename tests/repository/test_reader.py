@@ -5,6 +5,7 @@ import pickle
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import finished_repository
 import numpy as np
@@ -14,7 +15,9 @@ import zarr
 from known_repository import FRAMES, SETTINGS, SIZES, make
 
 import echotruth as et
+from echotruth.imaging.truth import wall_mask
 from echotruth.repository import estimates, remote
+from echotruth.repository.datasets import imaged_heart
 from echotruth.repository.group import NotWritten
 
 
@@ -65,6 +68,26 @@ def test_values_are_those_of_the_store(repository, known):
     np.testing.assert_array_equal(repository.heart().displacement, known.heart.displacement)
     assert list(repository.cases["status"]) == ["complete"] and list(repository.cases["reason"]) == [""]
     assert repository.tree["clips/heart/mid/bmode/64/image"].shape == (FRAMES, SIZES[1], SIZES[1])
+
+
+@pytest.mark.parametrize("view", ["mid", "long"])
+def test_clip_is_read_without_its_heart_and_tells_its_plane_and_wall(known, tmp_path, view):
+    folder = shutil.copytree(known.folder, tmp_path / "known")
+    shutil.rmtree(folder / "known.zarr/hearts")
+    clip, plane = et.Repository(folder).clip("heart", view, SIZES[1]), known.plane(view)
+    np.testing.assert_array_equal(clip.attrs["plane_origin"], plane.origin)
+    np.testing.assert_array_equal(clip.attrs["plane_axes"], plane.axes.ravel())
+    wall = wall_mask(known.heart, plane, clip["grid_axial"].values, clip["grid_lateral"].values)
+    np.testing.assert_array_equal(clip["grid_mask"], wall)
+    assert wall.any() and not wall.all()
+    assert imaged_heart(clip, known.heart)[0].displacement.shape == known.heart.displacement.shape
+    with pytest.raises(ValueError, match="made of another heart"):
+        imaged_heart(clip, replace(known.heart, displacement=2 * known.heart.displacement))
+
+
+def test_curves_have_the_names_of_segments(repository):
+    names = repository.curves()["aha_name"]
+    assert names.sel(aha=[1, 7, 14, 17]).values.tolist() == ["basal anterior", "mid anterior", "apical septal", "apex"]
 
 
 def test_tracked_arrays_are_those_of_their_size_and_tracker(repository):
@@ -122,8 +145,8 @@ def test_what_there_is_not_is_refused_in_one_sentence(repository, what):
 def test_heart_that_is_not_made_is_refused_in_one_sentence(several):
     with pytest.raises(NotWritten, match=r"has no group hearts/heart/geometry: run its configuration, which makes it"):
         several.heart("heart")
-    with pytest.raises(ValueError, match=r"small has no truth of heart mid yet: run it to its end, or fetch"):
-        several.difficulty("heart", "mid")
+    with pytest.raises(ValueError, match=r"has no group clips/heart/mid/(bmode|truth)/64: run its configuration"):
+        several.clip("heart", "mid")
 
 
 def test_script_may_go_to_another_folder_before_and_while_it_reads(known, tmp_path):
@@ -154,7 +177,7 @@ def test_array_of_an_earlier_format_is_not_read(known, tmp_path):
 def test_lost_file_is_told_where_a_part_is_read(known, tmp_path):
     folder = shutil.copytree(known.folder, tmp_path / "known")
     shutil.rmtree(folder / f"known.zarr/clips/heart/mid/bmode/{SIZES[0]}/image/c")
-    with pytest.raises(NotWritten, match="image: its data are lost: delete the group"):
+    with pytest.raises(NotWritten, match="image has lost its data: `echotruth check` of the repository names"):
         et.Repository(folder).read(f"bmode/{SIZES[0]}/image", "heart", "mid", 0)
 
 
@@ -183,6 +206,6 @@ def test_bucket_is_read_as_a_folder_is(repository, known, monkeypatch):
         xr.testing.assert_identical(distant.tracks(), repository.tracks())
         assert distant.scores.equals(repository.scores) and distant.config == repository.config
     with pytest.raises(FileNotFoundError, match=r"known\.zarr: is an address and not a folder: download it"):
-        distant.difficulty()
+        distant.folder  # noqa: B018 - it is asked for
     with pytest.raises(FileNotFoundError, match="s3://bucket/cases: is not a repository"):
         et.Repository("s3://bucket/cases")

@@ -14,6 +14,7 @@ from bokeh.document import Document
 from finished_repository import configured, finish
 
 import echotruth as et
+from echotruth.extras import installation
 from echotruth.learning import Clips
 from echotruth.repository.remote import Remote
 from echotruth.viewer.choice import first
@@ -110,5 +111,5 @@ def test_address_that_is_none_is_refused_in_a_sentence(url):
 
 def test_without_the_package_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "obstore", None)
-    with pytest.raises(OSError, match=r"pip install 'echotruth\[s3\]'$"):
+    with pytest.raises(OSError, match=f"needs the package obstore: {re.escape(installation('s3'))}$"):
         et.Repository("s3://bucket/small")

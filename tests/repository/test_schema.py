@@ -52,3 +52,12 @@ def test_every_array_is_in_a_finished_repository_but_for_those_that_are_asked_fo
     wanted = [array.name for kind, arrays in schema.KINDS.items() if "inference" not in kind for array in arrays]
     asked = tuple(name for name in OPTIONAL if name != "transmit")
     assert [name for name in wanted if name not in found and not name.startswith(asked)] == []
+
+
+def test_clip_lists_all_groups_and_arrays_that_it_holds(finished):
+    clips = list(finished.glob("*.zarr/clips/*/*/"))
+    for clip in clips:
+        listed = zarr.open_group(clip, mode="r", use_consolidated=True).metadata.consolidated_metadata
+        held = {path.parent.relative_to(clip).as_posix() for path in clip.rglob("*/zarr.json")}
+        assert set(listed.flattened_metadata) == held
+    assert len(clips) > 2

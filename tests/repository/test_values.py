@@ -6,7 +6,7 @@ import pytest
 
 from echotruth.cases import expand
 from echotruth.config import Motion
-from echotruth.repository import schema, values
+from echotruth.repository import schema, scores, values
 from echotruth.repository.reader import Repository
 
 CONFIG = finished.configured(views=("mid",), cases={})
@@ -20,7 +20,7 @@ def groups(tmp_path_factory):
     """Arrays of the groups of a heart that has no fault."""
     folder = finished.finish(tmp_path_factory.mktemp("values") / "small", CONFIG)
     view, repository = "mid", Repository(folder)
-    names = [*schema.HEART, "phantom", "rf", f"truth{SIZE}", f"bmode{SIZE}", f"tracking{SIZE}"]
+    names = [*schema.HEART, "phantom", "rf", f"truth{SIZE}", f"bmode{SIZE}", "points", "tracking/one"]
     return {name: repository.arrays(name, FIRST.id, None if name in schema.HEART else view) for name in names}
 
 
@@ -28,6 +28,16 @@ def groups(tmp_path_factory):
 def heart(groups):
     """Function from a group to arrays that may be changed."""
     return lambda group: {name: np.array(array) for name, array in groups[group].items()}
+
+
+def with_value(arrays, name, place, value):
+    """Arrays of a group with another value of one of them, or of a score."""
+    if name not in schema.SCORES:
+        arrays[name][place] = value
+        return arrays
+    found = scores.unpacked(arrays["scores"], CONFIG)
+    found[name][place] = value
+    return arrays | {"scores": scores.packed(found)}
 
 
 def found(group, arrays, config=CONFIG):
@@ -74,19 +84,18 @@ def test_whole_heart_has_no_fault(groups):
         ("truth/64", "tissue", (2, 2, 3), 1, "is not the wall in a pixel of the wall"),
         ("truth/64", "flow", (1, 0, 2, 3, 2), NAN, "in a pixel of the wall from which there is a frame"),
         ("truth/64", "flow", (2, 1, 2, 3), 0.0, "or is one elsewhere"),
-        ("tracking/64", "quality", (0, 1, 2, 2), 1.5, "above 1"),
-        ("tracking/64", "quality", (0, 1, 2, 2), NAN, "where there is no displacement, or the reverse"),
-        ("tracking/64", "coverage", (0,), NAN, "not numbers"),
-        ("tracking/64", "nrmse_all", (0,), -0.1, "below 0"),
-        ("tracking/64", "strain_correlation", (0, 0, 0, 0), 1.1, "above 1"),
-        ("tracking/64", "true_displacement", (1, 2, 2, 0), NAN, "at a point of the wall"),
-        ("tracking/64", "true_displacement", (0, 2, 2, 1), 1e-6, "is not 0 at end-diastole"),
-        ("tracking/64", "wall_axes", (2, 2, 0, 0), 0.5, "length is not 1"),
+        ("tracking/one", "quality", (0, 1, 2, 2), 1.5, "above 1"),
+        ("tracking/one", "quality", (0, 1, 2, 2), NAN, "where there is no displacement, or the reverse"),
+        ("tracking/one", "coverage", (0,), NAN, "not numbers"),
+        ("tracking/one", "nrmse_all", (0,), -0.1, "below 0"),
+        ("tracking/one", "strain_correlation", (0, 0, 0, 0), 1.1, "above 1"),
+        ("points", "true_displacement", (1, 2, 2, 0), NAN, "at a point of the wall"),
+        ("points", "true_displacement", (0, 2, 2, 1), 1e-6, "is not 0 at end-diastole"),
+        ("points", "wall_axes", (2, 2, 0, 0), 0.5, "length is not 1"),
     ],
 )
 def test_value_that_no_heart_can_have_is_found(heart, group, name, place, value, problem):
-    arrays = heart(group)
-    arrays[name][place] = value
+    arrays = with_value(heart(group), name, place, value)
     assert problem in found(group, arrays)[name]
 
 
@@ -103,12 +112,12 @@ def test_pixel_outside_the_wall_has_no_motion(heart, name):
         ("physiology", "twist_ivc", ()),  # a heart without isovolumic contraction
         ("mechanics", "pressure_target", (1,)),  # a loop that prescribes volume alone
         ("mechanics", "pressure", (1,)),  # a prescribed motion
-        ("tracking/64", "segment_nrmse", (0, 0, 0)),  # a segment that the view does not show
+        ("tracking/one", "segment_nrmse", (0, 0, 0)),  # a segment that the view does not show
     ],
 )
 def test_value_that_does_not_exist_is_no_fault(heart, group, name, place):
     arrays = heart(group)
-    arrays[name][place] = NAN
+    arrays = with_value(arrays, name, place, NAN)
     assert found(group, arrays) == {}
 
 

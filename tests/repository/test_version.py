@@ -1,6 +1,8 @@
 """Versions: what a result depends on has another one, what it does not depend on has not, and no code is forgotten."""
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import chdir
 from importlib.metadata import version
@@ -12,22 +14,12 @@ from finished_repository import configured
 from echotruth.cases import expand
 from echotruth.config import Config, shipped
 from echotruth.config.loading import load
-from echotruth.repository.version import BEFORE, CODE, NO_RF, PACKAGE, code_hash, motion_hash, packages, version_of
+from echotruth.repository.code import PACKAGE, _hash, code_hash, files_of, imported
+from echotruth.repository.version import BEFORE, motion_hash, packages, version_of
 
 ROOT = Path(__file__).parents[2]
-STAGES = list(CODE)
-PASSING = (
-    "__init__.py",
-    "cases",
-    "config",
-    "extras.py",
-    "files.py",
-    "repository",
-    "section.py",
-    "threads.py",
-    "workflow",
-)
-"""Modules and folders that pass numbers on, and whose changes make nothing again."""
+STAGES = list(BEFORE)
+OF_VIEW = [stage for stage in STAGES if stage != "inference"]
 
 
 def file_of(module: str) -> Path | None:
@@ -37,63 +29,94 @@ def file_of(module: str) -> Path | None:
     return found if module.startswith("echotruth") and found.is_file() else None
 
 
-def imported(file: Path) -> Iterator[Path]:
-    """Files of the package that a file imports, wherever in it."""
+def parsed(file: Path) -> Iterator[str]:
+    """Names that a file imports from the package, wherever in it, by Python's own parser."""
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
         if isinstance(node, ast.ImportFrom):
             assert not node.level, f"{file} imports by a relative name"
             names = [str(node.module), *(f"{node.module}.{name}" for name in names)]
-        yield from filter(None, map(file_of, names))
+        yield from (name for name in names if name.startswith("echotruth"))
 
 
-def reached(stage: str) -> set[str]:
-    """Files, below the package, that the script of a stage reaches by imports, less those that pass numbers on."""
-    found: set[Path] = set()
-    waiting = [ROOT / f"workflow/scripts/{stage}.py"]
-    while waiting:
-        new = {path for path in imported(waiting.pop()) if path.relative_to(PACKAGE).parts[0] not in PASSING} - found
-        found |= new
-        waiting += new
-    return {path.relative_to(PACKAGE).as_posix() for path in found}
+def test_imports_that_are_found_are_those_of_the_parser():
+    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "workflow/scripts").glob("*.py")]:
+        found, names = {*imported(file)}, {*parsed(file)}
+        assert found <= names if "if TYPE_CHECKING:" in file.read_text() else found == names, file
 
 
-@pytest.mark.parametrize("stage", STAGES)
-def test_version_has_all_code_that_a_stage_reaches(stage):
-    files = reached(stage)
-    left_out = {name for name in files if not any(name == part or name.startswith(f"{part}/") for part in CODE[stage])}
-    if stage in ("phantom", "rf"):
-        left_out |= files & set(NO_RF)
-    assert left_out == set() and files
+LOADED = "import {script}, sys; print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('echotruth')))"
 
 
-def test_every_place_of_the_code_is_there():
-    assert [name for names in (*CODE.values(), NO_RF, PASSING) for name in names if not (PACKAGE / name).exists()] == []
+@pytest.mark.parametrize("stage", ["bmode", "tracking"])
+def test_modules_that_a_script_loads_are_counted_but_for_those_that_the_passing_ones_load(stage):
+    def loaded(script):
+        run = [sys.executable, "-c", LOADED.format(script=script)]
+        return set(subprocess.run(run, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split())
+
+    passing = loaded("echotruth.workflow.job")
+    counted = {str(file) for file in files_of(stage)}
+    extra = {
+        name for name in loaded(f"workflow.scripts.{stage}") - passing - counted if not name.endswith("__init__.py")
+    }
+    assert {name for name in extra if "/repository/" not in name and "/config/" not in name} == set()
+
+
+def changed(monkeypatch, change, **settings):
+    """Stages of a view whose version is another one after a change of a file."""
+    config = configured(**settings)
+
+    def versions():
+        _hash.cache_clear()
+        imported.cache_clear()
+        return {stage: version_of(stage, config, "mid", "one") for stage in OF_VIEW}
+
+    before, read, text = versions(), Path.read_bytes, Path.read_text
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * (path.match(change)))
+    after = versions()
+    monkeypatch.setattr(Path, "read_bytes", read)
+    _hash.cache_clear()
+    assert Path.read_text is text
+    return {stage for stage in OF_VIEW if before[stage] != after[stage]}
 
 
 @pytest.mark.parametrize(
     ("file", "stages"),
     [
-        ("tracking/trackers/dis.py", {"tracking", "inference"}),
-        ("imaging/bmode.py", {"truth", "bmode", "tracking", "inference"}),
-        ("mechanics/solver/newton.py", set(STAGES)),
+        ("tracking/trackers/phase_correlation.py", {"tracking"}),
+        ("tracking/trackers/bspline_dic.py", set()),
+        ("tracking/quality.py", {"tracking"}),
+        ("imaging/bmode.py", {"truth", "bmode", "points", "tracking"}),
+        ("mechanics/solver/newton.py", set(OF_VIEW)),
+        ("materials/fung.py", set(OF_VIEW)),
+        ("materials/neo_hooke.py", set()),
+        ("mechanics/motion_file/xdmf.py", set()),
+        ("mechanics/geometry/remeshing.py", set()),
         ("repository/group.py", set()),
+        ("repository/rounding.py", set(OF_VIEW)),
+        ("echotruth/section.py", set(OF_VIEW)),
+        ("report/style.py", set()),
+        ("scripts/bmode.py", {"bmode", "tracking"}),
+        ("scripts/points.py", {"points", "tracking"}),
     ],
 )
-def test_changed_file_changes_the_code_of_the_stages_that_depend_on_it(monkeypatch, file, stages):
-    before = {stage: code_hash.__wrapped__(stage) for stage in STAGES}
-    read = Path.read_bytes
-    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * (path == PACKAGE / file))
-    assert {stage for stage in STAGES if code_hash.__wrapped__(stage) != before[stage]} == stages
+def test_changed_file_changes_the_versions_of_the_stages_that_use_it_and_of_those_after_them(monkeypatch, file, stages):
+    assert changed(monkeypatch, file, motion={}) == stages
 
 
-def test_changed_script_changes_the_code_of_its_stage_and_of_those_after_it(monkeypatch):
-    before, read = {stage: code_hash.__wrapped__(stage) for stage in STAGES}, Path.read_bytes
-    monkeypatch.setattr(Path, "read_bytes", lambda path: read(path) + b"#" * path.match("scripts/bmode.py"))
-    assert {stage for stage in STAGES if code_hash.__wrapped__(stage) != before[stage]} == {
-        "bmode",
-        "tracking",
-        "inference",
+def test_reader_of_a_motion_counts_where_a_motion_is_read(monkeypatch):
+    assert code_hash("mechanics", (), ("echotruth.mechanics.motion_file",)) != code_hash("mechanics")
+
+
+def test_unit_that_is_another_number_changes_every_version():
+    assert PACKAGE / "section.py" in files_of("bmode") and "UNITS" in (PACKAGE / "section.py").read_text()
+
+
+def test_data_of_a_module_count_as_it_does():
+    names = {file.name for file in files_of("report")} | {file.name for file in files_of("inference")}
+    assert {"page.css", "page.html.jinja", "player.js", "figure.mplstyle", "tracker_errors.csv", "arrays.csv"} <= names
+    assert "bspline_cnn.npz" in {
+        file.name for file in files_of("tracking", ["echotruth.tracking.trackers.bspline_cnn"])
     }
 
 
@@ -102,16 +125,17 @@ RF = {"phantom", "rf", *IMAGES}
 CHANGES = {
     "bmode.dynamic_range_dB": (35.0, IMAGES),
     "bmode.gain_dB": (3.0, IMAGES),
-    "bmode.size_px": (128, IMAGES | {"truth"}),
-    "bmode.downsampling": ([2], IMAGES | {"truth"}),
-    "bmode.field_of_view_mm": (13.0, RF | {"truth"}),
-    "tracking.grid": (0.02, {"tracking"}),
+    "bmode.size_px": (128, IMAGES | {"truth", "points"}),
+    "bmode.downsampling": ([2], IMAGES | {"truth", "points"}),
+    "bmode.field_of_view_mm": (13.0, RF | {"truth", "points"}),
+    "tracking.grid": (0.02, {"points", "tracking"}),
+    "tracking.frame_step": (2, {"tracking"}),
     "probe.elements": (20, RF),
     "phantom.density_per_mm3": (60.0, RF),
     "seed": (5, RF),
-    "views.mid.position": (0.6, RF | {"truth"}),
-    "fibres.endo_deg": (61.0, RF | {"truth", "mechanics"}),
-    "loop.heart_rate_per_min": (420.0, RF | {"truth", "mechanics"}),
+    "views.mid.position": (0.6, RF | {"truth", "points"}),
+    "fibres.endo_deg": (61.0, RF | {"truth", "points", "mechanics"}),
+    "loop.heart_rate_per_min": (420.0, RF | {"truth", "points", "mechanics"}),
     "physiology.twist_max_deg": (50.0, set()),
     "name": ("other", set()),
 }
@@ -128,9 +152,8 @@ def test_setting_changes_the_versions_of_the_stages_that_depend_on_it_and_no_oth
     assert section[parts[-1]] != value
     section[parts[-1]] = value
     before, after = configured(), Config.model_validate(values)
-    stages = [stage for stage in BEFORE if stage != "inference"]
-    changed = {stage for stage in stages if version_of(stage, before, "mid") != version_of(stage, after, "mid")}
-    assert changed == expected
+    found = {one for one in OF_VIEW if version_of(one, before, "mid", "one") != version_of(one, after, "mid", "one")}
+    assert found == expected
     if not key.startswith("views"):
         assert version_of("bmode", before, "mid") != version_of("bmode", before, "long_axis")
 
@@ -151,14 +174,14 @@ def test_file_that_a_tracker_names_changes_its_tracking_alone(tmp_path, file, tr
         program.write_text(text)
         with chdir(program.parent):
             config = configured(tracking={"trackers": {"own": tracker}})
-            return {stage: version_of(stage, config, "mid") for stage in BEFORE if stage != "inference"}
+            return {stage: version_of(stage, config, "mid", "own") for stage in OF_VIEW}
 
     one, other = versions("one"), versions("other")
     assert {stage for stage in one if one[stage] != other[stage]} == {"tracking"}
 
 
 def test_reason_for_which_a_heart_is_not_imaged_is_in_the_version():
-    assert version_of("rf", configured(), "mid", "failed") != version_of("rf", configured(), "mid")
+    assert version_of("rf", configured(), "mid", excluded="failed") != version_of("rf", configured(), "mid")
 
 
 @pytest.mark.parametrize("name", [name for name in shipped.names() if name not in ("fimh25", "rodero")])

@@ -103,7 +103,7 @@ def test_ids_do_not_depend_on_conditions():
 
 
 def test_labels_of_the_table_can_be_asked_for():
-    table = "case,seed,label.group,label.age\na,1,sham,12\nb,2,MI,14\nc,3,MI,\n"
+    table = "case,seed,label.group,label.age\na,1,sham,12\nb,2,MI,14\nd,3,MI,\n"
     assert ids({"table": table, "where": "label.group == 'MI'"}) == [{"seed": 2}, {"seed": 3}]
     assert ids({"table": table, "where": "label.age != null and label.age > 12"}) == [{"seed": 2}]
 

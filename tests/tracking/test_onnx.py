@@ -13,7 +13,9 @@ import echotruth as et
 from echotruth.config.tracking import Onnx
 from echotruth.tracking import TrackerFailed, track
 
-onnx = pytest.importorskip("onnx")  # what needs neither is in tests/test_light.py and tests/evaluation/test_run.py
+onnx = pytest.importorskip(
+    "onnx"
+)  # what needs neither is in tests/test_light.py and tests/workflow/test_added_tracker.py
 pytest.importorskip("onnxruntime")
 from onnx import TensorProto, helper, numpy_helper  # noqa: E402
 
@@ -370,7 +372,9 @@ def test_command_scores_a_model_under_its_name_and_says_in_one_line_why_it_canno
     chosen = ("evaluate", "hearts", "--case", "healthy", "--view", "mid", "--onnx", "my-net.onnx")
     declare(tmp_path / "my-net.onnx", coordinates="row_column")
     status, said = command(*chosen)
-    assert status == 0 and (tmp_path / "hearts/external/my_net.csv").is_file(), said
+    assert status == 0 and "my_net is a tracker of" in said, said
+    scores = et.Repository(tmp_path / "hearts").scores
+    assert scores.loc[scores["tracker"] == "my_net", "nrmse_percent"].notna().tolist() == [True]
     status, said = command(*chosen, "--option", "window=3")
     assert status == 2 and "window is not a key of the method onnx" in said
     status, said = command(*chosen, "--timeout", "0")

@@ -12,9 +12,8 @@ import yaml
 
 from echotruth.config import Config
 from echotruth.config.loading import checked, validate
-from echotruth.config.tracking import TRACKER_ARGUMENTS, External, OnnxSignature
+from echotruth.config.tracking import ENTRY_POINT_GROUP, TRACKER_ARGUMENTS, External, OnnxSignature
 from echotruth.tracking import track
-from echotruth.tracking.trackers.external import ENTRY_POINT_GROUP
 
 PAGE = (Path(__file__).parents[2] / "docs/trackers.md").read_text()
 TRACKER, PROGRAM, FLOW = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)

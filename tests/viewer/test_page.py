@@ -1,7 +1,7 @@
 """What can be chosen, what the address says, and what the page says where something is not there."""
 
+import os
 import shutil
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +13,11 @@ from bokeh.document import Document
 from finished_repository import begin, configured
 from known_repository import SIZES
 
-from echotruth.evaluation.run import prepare
 from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import TRUTH, Choice, asked, first
 from echotruth.viewer.page import Page
 from echotruth.viewer.server import ShowError, opened, serve, texts
+from echotruth.workflow.added_tracker import prepare
 
 pytestmark = pytest.mark.slow
 
@@ -129,7 +129,7 @@ def test_damaged_file_is_said_and_nothing_else_is_shown(shown, tmp_path):
     assert not page.message.visible and page.clip.data["grey"][0].any()
 
 
-def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_missing(shown, tmp_path, monkeypatch):
+def test_added_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_missing(shown, tmp_path, monkeypatch):
     folder = Path(shutil.copytree(shown.folder, tmp_path / "known"))
     (tmp_path / "diagonal.py").write_text(
         "import numpy as np\n"
@@ -137,21 +137,20 @@ def test_kept_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_m
         "    course = np.arange(len(frames))[:, None, None]\n"
         "    return course * np.ones((1, len(points), 2)), np.ones((len(frames), len(points)))\n"
     )
-    monkeypatch.setattr(sys, "path", [str(tmp_path), *sys.path])
-    run = prepare(Repository(folder), "outside", {"method": "external", "track": "diagonal:track"}, True)
-    case_views, sizes = run.case_views([], ["mid"]), run.sizes([SIZES[0]])
-    run.check_writable()
-    run.write(list(run.rows(case_views, sizes)))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    run = prepare(Repository(folder), "outside", {"method": "external", "track": "diagonal:track"})
+    assert len(list(run.rows(run.case_views([], ["mid"])))) == len(SIZES)
     repository = Repository(folder)
     page = Page(repository, first(repository), "", Document())
     page.arrows.active = [1]
     choose(page, tracker="outside", colour="displacement_error")
-    assert not page.message.visible and page.graphs["strain"].source.data["y1"].shape == (3,)
+    assert "outside has no estimate of this strain" in page.message.text  # the contours of this wall are made up
+    assert page.graphs["strain"].source.data["y1"].shape == (3,)
     assert page.panels[0].colour.data["index"][0].any()
     start, end = (page.panels[0].movements["tracked"].data[name].reshape(3, -1) for name in ("x0", "x1"))
     np.testing.assert_allclose(np.nanmax(end[-1] - start[0]), 1e3 * 2 * 12e-3 / SIZES[0], rtol=1e-3)
     choose(page, view="long")
-    assert "was not evaluated" in page.message.text and "not evaluated on this clip" in page.facts.text
+    assert "no tracking/outside of heart long" in page.message.text and "not evaluated on this clip" in page.facts.text
     assert not page.panels[0].colour.data["index"][0].any() and not page.panels[0].movements["tracked"].data["x0"].size
 
 

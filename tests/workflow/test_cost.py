@@ -32,13 +32,13 @@ def test_larger_work_takes_longer_and_asks_for_more(rule, change):
     assert after["runtime"] >= before["runtime"] and after["mem_mb"] > before["mem_mb"]
 
 
-def test_jobs_are_those_of_the_hearts_the_clips_and_the_sizes():
+def test_jobs_are_those_of_the_hearts_the_clips_and_the_trackers():
     config = load(ROOT / "config/sweep.yaml")
     cases = expand(config)
     hearts, views = len({case.heart for case in cases}), len(config.views)
     found = cost.jobs(config, hearts, len(cases))
     assert found["mechanics"] == hearts <= len(cases) and found["rf"] == len(cases) * views
-    assert found["tracking"] == found["rf"] * len(config.bmode.sizes) and found["repository"] == 1
+    assert found["tracking"] == found["rf"] * len(config.tracking.trackers) and found["repository"] == 1
     assert "inference" not in found
 
 
@@ -70,11 +70,12 @@ def test_files_are_about_those_of_a_repository():
 
 
 def test_page_on_clusters_has_time_and_memory_of_the_jobs():
-    rows = re.findall(r"^\| .* (\w+) trackers?\) \| (.*) \|$", (ROOT / "docs/cluster.md").read_text(), re.MULTILINE)
-    for (trackers, cells), name in zip(rows, ("demo", "sweep"), strict=True):
+    rows = re.findall(r"^\| (\w+) \(mouse.*?\) \| (.*) \|$", (ROOT / "docs/cluster.md").read_text(), re.MULTILINE)
+    assert [name for name, _ in rows] == ["demo", "sweep"]
+    for name, cells in rows:
         config = load(ROOT / f"config/{name}.yaml")
-        assert {"three": 3, "six": 6}[trackers] == len(config.tracking.trackers)
-        asked = [cost.resources(rule, config) for rule in ("mechanics", "phantom", "rf", "truth", "bmode", "tracking")]
+        rules = ("mechanics", "phantom", "rf", "truth", "bmode", "points", "tracking")
+        asked = [cost.resources(rule, config) for rule in rules]
         assert cells.split(" | ") == [f"{job['runtime']} min, {job['mem_mb'] / 1000:.1f} GB" for job in asked]
 
 

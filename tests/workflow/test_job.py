@@ -31,7 +31,7 @@ def test_job_reads_what_was_written_by_those_before_it(done):
 def test_results_do_not_depend_on_the_order_of_the_jobs_of_a_view(done, tmp_path):
     (case,) = begin(tmp_path / "small", CONFIG)
     stages = {one.stage: one for one in jobs(tmp_path / "small", case)}
-    for stage in ("mechanics", "truth", "phantom", "rf", "bmode", "tracking"):
+    for stage in ("mechanics", "points", "truth", "phantom", "rf", "bmode", "tracking"):
         do(stages[stage])
     assert remake(tmp_path / "small", CONFIG) == ["repository"]
     assert content(tmp_path / "small") == content(done)
@@ -99,7 +99,7 @@ def test_configuration_of_a_case_that_cannot_be_read_is_told(folder, content, se
     [
         ("mechanics", ["nobody"], "nobody.json: is not there: the ids are in cases.csv"),
         ("rf", ["heart", "side"], "side is not a view of .*small: use mid$"),
-        ("tracking", ["heart", "mid", "100"], "100 is not an image size of .*small: use 64$"),
+        ("tracking", ["heart", "mid", "two"], "two is not a tracker of .*small: use one$"),
     ],
 )
 def test_wrong_place_is_refused_in_one_sentence(done, monkeypatch, stage, arguments, sentence):
@@ -125,16 +125,16 @@ def test_folder_that_is_no_repository_is_refused(tmp_path, monkeypatch):
         main("rf", blank, None)
 
 
-def test_job_writes_the_groups_of_all_sizes_or_those_of_its_own():
+def test_job_writes_the_groups_of_all_sizes_or_that_of_its_tracker():
     sizes = configured(bmode={"size_px": 64, "downsampling": (1, 2)})
     found = {}
-    for stage, size in (("truth", None), ("tracking", 32), ("mechanics", None), ("inference", None)):
+    for stage, tracker in (("truth", None), ("tracking", "dis"), ("mechanics", None), ("inference", None)):
         one = object.__new__(Job)
-        one.stage, one.size, one.config = stage, size or 0, sizes
+        one.stage, one.tracker, one.config = stage, tracker, sizes
         found[stage] = one.groups()
     assert found == {
         "truth": ["truth/64", "truth/32"],
-        "tracking": ["tracking/32"],
+        "tracking": ["tracking/dis"],
         "mechanics": ["heart"],
         "inference": ["inference"],
     }

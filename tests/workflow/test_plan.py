@@ -1,19 +1,20 @@
 """A plan: hearts, cases and resources of a configuration, and what of it stands already."""
 
+import os
+import shutil
 from contextlib import chdir
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 import yaml
-from finished_repository import begin, configured, content, finish, plan_of, remake
+from finished_repository import begin, configured, content, finish, missing, plan_of, remake
 
 import echotruth as et
-from echotruth.config import Bmode, Cases
+from echotruth.config import Cases
 from echotruth.config.loading import ConfigError
 from echotruth.repository.check import check
-from echotruth.repository.metadata import OUTDATED
-from echotruth.workflow import lock
+from echotruth.repository.places import JobPlace
 from echotruth.workflow.plan import Plan, as_yaml
 
 CONFIG = configured(cases={"fibres.endo_deg": [60.0, 70.0], "seed": [1, 2]})
@@ -24,16 +25,13 @@ def done(tmp_path_factory):
     return finish(tmp_path_factory.mktemp("done") / "small", configured(views=("mid",), cases={}))
 
 
-def whole(folder):
-    """Groups that Snakemake sees: `heart`, `rf` and so on."""
-    groups = [path.parent for path in (folder / "small.zarr").glob("*/**/zarr.json")]
-    return {path.name if path.name.isalpha() else path.parent.name for path in groups} & {
-        *("heart", "phantom", "rf", "truth", "bmode", "tracking")
-    }
+def not_made(folder, config):
+    """Jobs that a run of a configuration would do, as `rf` or `tracking one`."""
+    return {" ".join(filter(None, (job.stage, job.tracker))) for job in missing(plan_of(folder, config))}
 
 
-def outdated(folder):
-    return {path.parent.relative_to(folder / "small.zarr").as_posix() for path in folder.rglob(OUTDATED)}
+def files(folder):
+    return {path: (path.stat().st_mtime_ns, path.stat().st_ino) for path in folder.rglob("*")}
 
 
 def test_heart_serves_all_cases_that_move_alike():
@@ -41,68 +39,101 @@ def test_heart_serves_all_cases_that_move_alike():
     assert len(plan.hearts) == 2 and len(plan.cases) == 4
     for heart, case in plan.hearts.items():
         assert plan.cases[case].heart == heart == plan.cases[plan.case_of(SimpleNamespace(heart=heart))].heart
-    assert {plan.heart(SimpleNamespace(case=case)) for case in plan.cases} == {
+    needed = plan.needed("truth", f"{plan.store}/hearts/{{heart}}/zarr.json")
+    assert {file for case in plan.cases for file in needed({"case": case, "view": "mid"})} == {
         f"{plan.store}/hearts/{heart}/zarr.json" for heart in plan.hearts
     }
 
 
 @pytest.mark.parametrize(
-    ("section", "set_aside"),
+    ("section", "again"),
     [
-        ({"bmode": {"dynamic_range_dB": 35.0}}, {"bmode/64", "tracking/64"}),
-        ({"tracking": {"trackers": {"two": {"method": "dis"}}}}, {"tracking/64"}),
+        ({"bmode": {"dynamic_range_dB": 35.0}}, {"bmode", "tracking one"}),
+        ({"tracking": {"trackers": {"one": {"method": "dis"}}}}, {"tracking one"}),
+        ({"tracking": {"trackers": {"one": {"window_px": 16}, "two": {"method": "dis"}}}}, {"tracking two"}),
         ({"physiology": {"twist_max_deg": 80.0}}, set()),
-        ({"views": {"mid": {"position": 0.6}}}, {"phantom", "rf", "truth/64", "bmode/64", "tracking/64"}),
+        ({"views": {"mid": {"position": 0.6}}}, {"phantom", "rf", "truth", "bmode", "points", "tracking one"}),
     ],
 )
-def test_what_was_made_otherwise_is_set_aside_and_taken_back_with_its_settings(done, section, set_aside):
-    config, before = configured(views=("mid",), cases={}), {path for path in done.rglob("*") if path.is_file()}
+def test_what_was_made_otherwise_is_asked_for_and_nothing_is_touched(done, section, again):
+    config, before = configured(views=("mid",), cases={}), files(done)
     values = config.model_dump()
     for name, keys in section.items():
         values[name] = values[name] | keys
-    changed = type(config).model_validate(values)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(lock, "hold", lambda folder: True)
-        plan_of(done, changed).settle()
-        assert outdated(done) == {f"clips/heart/mid/{name}" for name in set_aside}
-        plan_of(done, config).settle()
-    after = {path for path in done.rglob("*") if path.is_file() and path.name != ".SHA256SUMS.outdated"}
-    assert outdated(done) == set() and before - after <= {done / "SHA256SUMS"} and after <= before
-    finish(done, config)
+    plan = plan_of(done, type(config).model_validate(values))
+    assert not_made(done, plan.config) == again and not_made(done, config) == set() and files(done) == before
+    for stage in again:
+        name, _, tracker = stage.partition(" ")
+        wildcards = {"case": "heart", "view": "mid"} | ({"tracker": tracker} if tracker else {})
+        heart = f"{plan.store}/hearts/{{heart}}/zarr.json"
+        assert plan.needed(name, heart)(wildcards) == [heart.format(heart="heart")]
+        path = f"{plan.store}/{plan._groups(JobPlace(name, 'heart', 'mid', tracker or None))[0]}/zarr.json"
+        (asked,) = plan.asked_for([path])
+        assert asked == (
+            path if tracker == "two" else f"{plan.touched}/{name}/heart/mid{f'/{tracker}' * bool(tracker)}"
+        )
+        assert not Path(asked).exists()
 
 
-def test_what_the_configuration_has_no_more_is_set_aside_and_is_no_part_of_the_repository(tmp_path):
+def test_what_the_configuration_has_no_more_is_no_part_of_the_repository_and_comes_back_without_a_job(tmp_path):
     more = configured(bmode={"size_px": 64, "downsampling": (1, 2)}, cases={"fibres.endo_deg": [60.0, 70.0]})
-    one = {"views": {"mid": more.views["mid"]}, "bmode": Bmode(size_px=64, downsampling=(1,))}
+    one = {"views": {"mid": more.views["mid"]}, "tracking": more.tracking}
     fewer = more.model_copy(update=one | {"cases": Cases.model_validate({"fibres.endo_deg": [70.0]})})
     folder, before = finish(tmp_path / "small", more), content(tmp_path / "small")
-    assert remake(folder, fewer) == ["repository"] and check(folder).faults == []
+    assert remake(folder, fewer) == ["repository"]
+    report = check(folder)
+    assert report.faults == [] and "groups are not of the configuration" in report.notes[0]
     at_once = finish(tmp_path / "fewer" / "small", fewer) / "SHA256SUMS"
     assert (folder / "SHA256SUMS").read_bytes() == at_once.read_bytes()
     assert len(et.Repository(folder).tree["clips"].children) == 1
     assert remake(folder, more) == ["repository"] and content(folder) == before
 
 
-def test_process_that_only_lists_jobs_leaves_all_as_it_was(done, monkeypatch):
-    def files():
-        return {path: path.stat().st_mtime_ns for path in done.rglob("*") if path.is_file()}
-
-    before = files()
-    monkeypatch.setattr(lock, "hold", lambda folder: True)
-    plan = plan_of(done, configured(views=("mid",), cases={}, bmode={"size_px": 32, "downsampling": (1,)}))
-    plan.settle()
-    assert not (done / "SHA256SUMS").exists()
-    plan._take_back()
-    assert files() == before
+def test_dates_say_nothing(done):
+    for date in (1e9, 4e9):  # in 2001, all the same, and in 2096
+        for path in done.rglob("*"):
+            os.utime(path, (date, date))
+        config = configured(views=("mid",), cases={})
+        assert not_made(done, config) == set() and plan_of(done, config).is_published
+    assert not_made(done, configured(views=("mid",), cases={}, seed=3)) >= {"phantom"}
 
 
-def test_plan_alone_writes_nothing_and_the_lock_is_held_before_anything_is_set_aside(done, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("lost", "jobs", "is_published"),
+    [
+        ("small.zarr/hearts/heart", {"mechanics"}, False),
+        ("small.zarr/clips/heart/mid/bmode/64", {"bmode"}, False),
+        ("small.zarr/clips/heart/mid/rf", set(), False),
+        ("small.zarr/clips/heart/mid/phantom", set(), False),
+        ("config.yaml", set(), False),
+        ("cases/heart.json", set(), True),
+    ],
+)
+def test_only_what_is_lost_is_made_again(done, tmp_path, lost, jobs, is_published):
+    folder, config = shutil.copytree(done, tmp_path / "small"), configured(views=("mid",), cases={})
+    shutil.rmtree(folder / lost) if (folder / lost).is_dir() else (folder / lost).unlink()
+    assert not_made(folder, config) == jobs and plan_of(folder, config).is_published is is_published
+
+
+def test_lost_images_and_lines_ask_for_the_scatterers_that_both_come_from(done, tmp_path):
+    folder = shutil.copytree(done, tmp_path / "small")
+    for group in ("bmode", "rf", "phantom"):
+        shutil.rmtree(folder / "small.zarr/clips/heart/mid" / group)
+    assert not_made(folder, configured(views=("mid",), cases={})) == {"phantom", "rf", "bmode"}
+
+
+def test_date_in_the_future_is_no_longer_one_when_a_run_begins(done, tmp_path):
+    folder, config = shutil.copytree(done, tmp_path / "small"), configured(views=("mid",), cases={})
+    path = folder / "small.zarr/clips/heart/mid/rf/zarr.json"
+    os.utime(path, (4e9, 4e9))
+    begin(folder, config)
+    assert path.stat().st_mtime < 4e9 and not_made(folder, config) == set()
+
+
+def test_plan_alone_writes_nothing(tmp_path):
     with chdir(tmp_path):
-        Plan({"name": "small"}).settle()
-    assert not list(tmp_path.iterdir())
-    monkeypatch.setattr(lock, "hold", lambda folder: False)  # a job of the run that holds it
-    plan_of(done, configured(views=("mid",), cases={}, bmode={"size_px": 32, "downsampling": (1,)})).settle()
-    assert outdated(done) == set()
+        plan = Plan({"name": "small"})
+        assert not plan.is_published and not list(tmp_path.iterdir())
 
 
 def test_what_a_killed_run_left_is_removed(done):

@@ -17,7 +17,7 @@ from workspace import COMMAND, ROOT, Workspace, alone
 from echotruth.workflow.lock import VARIABLE
 
 SCRIPTS = sorted((ROOT / "workflow/scripts").glob("[!_]*.py"))
-RULES = {"mechanics", "phantom", "rf", "truth", "bmode", "tracking", "inference", "repository", "report"}
+RULES = {"mechanics", "phantom", "rf", "truth", "bmode", "points", "tracking", "inference", "repository", "report"}
 ASKED = sorted(RULES - {"inference"})
 
 
@@ -84,7 +84,7 @@ def test_graph_of_rules_is_the_way_of_a_view_and_nothing_is_written(tmp_path):
     assert set(names.values()) == {"all", *ASKED}
     chain = ["mechanics", "phantom", "rf", "bmode", "tracking", "repository", "report"]
     assert set(pairwise(chain)) <= edges
-    assert {one for one, other in edges if other == "tracking"} == {"mechanics", "truth", "bmode"}
+    assert {one for one, other in edges if other == "tracking"} == {"mechanics", "truth", "bmode", "points"}
     assert {other for one, other in edges if one == "truth"} == {"tracking", "repository", "all"}
     assert not workspace.out.exists()
 

@@ -68,7 +68,7 @@ def test_merged_repositories_are_one_that_was_made_at_once(made, tmp_path):
 
 
 ONE = configured(views=("mid",), cases={})
-JOBS = ["mechanics", "phantom", "rf", "truth", "bmode", "tracking"]
+JOBS = ["mechanics", "phantom", "rf", "truth", "bmode", "points", "tracking"]
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +91,7 @@ def test_run_that_is_stopped_after_each_job_is_one_that_went_on(one, tmp_path):
             remake(tmp_path / "small", ONE, work)
         assert done == [stage] and not (tmp_path / "small/SHA256SUMS").exists()
         done.clear()
-    assert remake(tmp_path / "small", ONE, work) == ["tracking heart mid 64", "repository"]
+    assert remake(tmp_path / "small", ONE, work) == ["tracking heart mid one", "repository"]
     assert content(tmp_path / "small") == one
 
 
@@ -133,7 +133,9 @@ def test_run_that_is_killed_anywhere_is_one_that_went_on(one, tmp_path):
         if in_process(folder, numbers.randint(1, EVENTS)) == -signal.SIGKILL:
             killed += 1
         elif not numbers.randrange(2):  # it is whole: lose a job of it
-            shutil.rmtree(folder / f"small.zarr/clips/heart/mid/{numbers.choice(['truth', 'bmode', 'tracking'])}")
+            shutil.rmtree(
+                folder / f"small.zarr/clips/heart/mid/{numbers.choice(['truth', 'bmode', 'points', 'tracking'])}"
+            )
         else:
             shutil.rmtree(folder)
     remake(folder, ONE)
@@ -150,7 +152,7 @@ def test_changed_log_compression_makes_images_and_tracks_anew_which_are_those_of
     done = remake(folder, changed, solved)
     assert sorted(done) == sorted(
         [*(f"bmode {clip}" for clip in clips), "repository"]
-        + [f"tracking {clip} {size}" for clip in clips for size in FINISHED.bmode.sizes]
+        + [f"tracking {clip} {tracker}" for clip in clips for tracker in TRACKERS]
     )
     old, new = Repository(finished), Repository(folder)
     case = expand(FINISHED)[0].id

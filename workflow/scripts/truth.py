@@ -3,11 +3,13 @@
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import PixelTruth
+from echotruth.repository.datasets import source_of
 from echotruth.workflow.job import Job, Result, main
 
 
 def work(job: Job) -> Result:
     found = {}
+    job.notes |= source_of(job.solved, job.plane)
     for size in job.config.bmode.sizes:
         pixels = pixel_centres(job.config.bmode, size)
         tissue = TissueImages(job.config, job.heart, job.plane, *pixels)

@@ -16,16 +16,12 @@ def add(parser: argparse.ArgumentParser) -> None:
     # `arguments.command` is the name of the subcommand.
     tracker.add_argument("--command", dest="program", help='a program, such as "track {input} {output}"')
     parser.add_argument("--timeout", type=float, help="longest time of the program per clip, s (default: 3600)")
-    parser.add_argument("--name", help="name of the tracker in the scores (default: derived from the tracker)")
-    parser.add_argument(
-        "--keep", action="store_true", help="store displacement and curves of strain too, as external/NAME.zarr"
-    )
+    parser.add_argument("--name", help="name of the tracker in the repository (default: derived from the tracker)")
     add_repeated(
         parser,
         ("option", str, "key=value for the tracker; can be repeated"),
         ("case", str, "case id from cases.csv; can be repeated (default: all)"),
         ("view", str, "name of the view; can be repeated (default: all)"),
-        ("size", int, "image size, px; can be repeated (default: all)"),
     )
     parser.add_argument(
         "--jobs", type=int, default=1, help="processes at a time (default: 1); scores do not depend on it"
@@ -33,7 +29,10 @@ def add(parser: argparse.ArgumentParser) -> None:
 
 
 def evaluate(arguments: argparse.Namespace) -> int:
-    """Run a tracker on every clip of a repository, score it like the repository's own trackers, write the scores.
+    """Run a tracker on every clip of a repository, and add it to the trackers of the repository.
+
+    It is scored by what scores the other trackers, and stands beside them in the leaderboard of the report,
+    which the next run draws.
 
     A tracker is a function track(frames, points, mask, spacing, frame_time, seed), which returns the
     displacement (frame, point, 2) since frame 0 in pixels, lateral and axial, of points (point, 2); or a
@@ -50,27 +49,24 @@ def evaluate(arguments: argparse.Namespace) -> int:
       1  it failed on every clip
       2  it cannot be evaluated
     """
-    from echotruth.evaluation.availability import check_name, check_runs
-    from echotruth.evaluation.run import format_row, prepare, summary
+    from echotruth.evaluation.availability import check_runs
     from echotruth.evaluation.tracker_options import parse_tracker
     from echotruth.repository.reader import Repository
+    from echotruth.workflow.added_tracker import format_row, prepare, summary
+    from echotruth.workflow.lock import LockError
 
     rows = []
     try:
         name, settings = parse_tracker(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
-        if arguments.tracker is not None:
-            check_name(arguments.tracker)
-        evaluation = prepare(Repository(arguments.repository), arguments.name or name, settings, arguments.keep)
-        case_views, sizes = evaluation.case_views(arguments.case, arguments.view), evaluation.sizes(arguments.size)
-        check_runs(evaluation.settings)
-        evaluation.check_writable()
-        for row in evaluation.rows(case_views, sizes, arguments.jobs):
+        added = prepare(Repository(arguments.repository), arguments.name or name, settings)
+        case_views = added.case_views(arguments.case, arguments.view)
+        check_runs(added.settings)
+        for row in added.rows(case_views, arguments.jobs):
             print(format_row(row), flush=True)
             rows.append(row)
-        table = evaluation.write(rows)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, LockError) as error:
         return fail(str(error))
-    print(f"\n{summary(table)}\n\nScores: {evaluation.file}")
-    if arguments.keep:
-        print(f"Motion: {evaluation.file.with_suffix('.zarr')}")
+    if not rows:
+        return fail(f"{added.repository.folder}: its hearts are outside their bounds, so that no clip is tracked")
+    print(f"\n{summary(rows)}\n\n{added.name} is a tracker of {added.repository.folder}")
     return 0 if any(not row["failure"] for row in rows) else 1

@@ -55,8 +55,7 @@ def info(arguments: argparse.Namespace) -> int:
         return fail(f"{error.filename or place}: cannot be read ({error.strerror or error})")
     except (ValueError, KeyError) as error:
         return fail(f"{place}: is damaged ({' '.join(str(error).split())}): run echotruth check {place}")
-    if found.attributes(""):
-        print(f'\nOpen it:\n  import echotruth as et\n  repository = et.Repository("{place}")')
+    print(f'\nOpen it:\n  import echotruth as et\n  repository = et.Repository("{place}")')
     if found.shown and found.views:
         print(f'  clip = repository.clip("{found.shown[0]}", "{found.views[0]}")')
     return 0
@@ -93,11 +92,13 @@ def _installation() -> dict[str, str]:
 
 def _repository(found: Repository) -> dict[str, str]:
     """What a repository holds."""
+    from echotruth.repository.checksums import CHECKSUMS
+
     config, cases, packages = found.config, found.cases, found.attributes("").get("packages", {})
     statuses = ", ".join(f"{number} {status}" for status, number in cases["status"].value_counts().items())
     views = [f"{name} ({view.plane.replace('_', ' ')})" for name, view in config.views.items()]
-    external = {path.stem for path in (found.folder / "external").glob("[!.]*") if path.suffix in (".csv", ".zarr")}
     made = ", ".join(f"{name} {packages[name]}" for name in ("echotruth", "numpy", "zarr") if name in packages)
+    is_published = (found.folder / CHECKSUMS).is_file()
     sizes, (files, size) = ", ".join(map(str, found.sizes)), _size(found.folder)
     return {
         "repository": f"{found.folder}",
@@ -108,9 +109,8 @@ def _repository(found: Repository) -> dict[str, str]:
         "sizes": f"{sizes} px, {config.bmode.field_of_view_mm:g} mm wide; array {config.probe.preset}",
         "RF": ", ".join(["lines", *config.rf.keep]),
         "trackers": ", ".join(config.tracking.trackers),
-        "from outside": ", ".join(sorted(external)),
         "on disk": f"{_bytes(size)} in {files} files",
-        "made by": made or "not published yet: run it to its end",
+        "made by": made if is_published else "not published yet: run it to its end",
     }
 
 

@@ -25,13 +25,13 @@ def merge(arguments: argparse.Namespace) -> int:
     exit status:
       0  it is copied
       1  the configuration is not valid
-      2  a folder is no repository, or a run works on the one that is made
+      2  a folder is no repository or is damaged, or a run works on the one that is made
     """
     from echotruth.cli.configuration import load_cases
     from echotruth.config import shipped
     from echotruth.repository.places import repository_folder
     from echotruth.workflow.lock import LockError, is_held
-    from echotruth.workflow.merging import merge
+    from echotruth.workflow.merging import Damaged, merge
     from echotruth.workflow.plan import Plan
 
     config, _ = load_cases(arguments.config)
@@ -42,7 +42,7 @@ def merge(arguments: argparse.Namespace) -> int:
             return fail(f"{busy[0]}: a run works on it: wait for it")
         plan.begin()
         copied = merge(plan, sources)
-    except (FileNotFoundError, LockError) as error:
+    except (FileNotFoundError, LockError, Damaged) as error:
         return fail(str(error))
     print(f"{plan.folder}: {copied} hearts and clips are copied: echotruth run {arguments.config} makes the rest")
     return 0

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from echotruth.cli import recording
-from echotruth.cli.command import did_you_mean, fail, model, named
+from echotruth.cli.command import fail, model, named
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall_file import default_output, said
 
@@ -61,7 +61,7 @@ def track(arguments: argparse.Namespace) -> int:
     try:
         _check_options(arguments)
         names = _names(clips, walls, arguments.output, _sources(table))
-    except EchoError as error:
+    except (EchoError, ValueError) as error:
         return fail(str(error))
     lacking = [_lacking(path, wall, arguments) for path, wall in zip(clips, walls, strict=True)]
     if all(lacking):
@@ -75,13 +75,14 @@ def track(arguments: argparse.Namespace) -> int:
 
 
 def _check_options(arguments: argparse.Namespace) -> None:
-    """Raise an :class:`EchoError` if one wall is given for several clips, or there is no such tracker."""
+    """Raise an EchoError if one wall is given for several clips, or a ValueError if there is no such tracker."""
     clips, tracker = len(arguments.clip), arguments.tracker
     if arguments.wall and clips > 1:
         raise EchoError(f"--wall {arguments.wall}: suits one clip: name those of {clips} clips CLIP.wall.csv")
-    if not (":" in tracker or tracker.endswith(".onnx") or tracker in TRACKERS):
-        otherwise = f"use one of {', '.join(TRACKERS)}, package.module:function or MODEL.onnx"
-        raise EchoError(f"--tracker {tracker}: {did_you_mean(tracker, TRACKERS, otherwise)}")
+    if tracker not in TRACKERS:
+        from echotruth.config.building import tracker_values
+
+        tracker_values(tracker, {})
 
 
 def _rows(clips: Iterable[tuple[Path, Path, str, str]], arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:

@@ -1,6 +1,8 @@
 """Building a configuration in Python: from a file, another configuration or nothing, and some keys."""
 
 from collections.abc import Callable
+from difflib import get_close_matches
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +10,7 @@ from echotruth.config import shipped
 from echotruth.config.loading import ConfigError, beside, read_yaml, validate
 from echotruth.config.merging import difference, merged, nested
 from echotruth.config.sections import Config
-from echotruth.config.tracking import External
+from echotruth.config.tracking import BUILTIN, ENTRY_POINT_GROUP, External
 
 Source = Config | dict[str, Any] | str | Path | None
 
@@ -70,6 +72,33 @@ def _given(config: Config) -> dict[str, Any]:
     return found if follows else found | {"probe": presets["probe"] | found.get("probe", {})}
 
 
+def tracker_values(tracker: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Settings of a tracker by its name.
+
+    Parameters
+    ----------
+    tracker : str
+        A method, `package.module:function`, an entry point, or the file of a model in ONNX.
+    options : dict
+        Keys of the section, or keyword arguments of the function.
+
+    Raises
+    ------
+    ConfigError
+        If it is none of these, with what was probably meant.
+    """
+    known = [*BUILTIN, *entry_points(group=ENTRY_POINT_GROUP).names]
+    if tracker.endswith(".onnx"):
+        return {"method": "onnx", "model": tracker, **options}
+    if tracker in BUILTIN:
+        return {"method": tracker, **options}
+    if ":" in tracker or tracker in known:
+        return {"method": "external", "track": tracker, "options": options}
+    close = get_close_matches(tracker.lower(), known, n=1)
+    remedy = f"write package.module:function or MODEL.onnx, or use one of {', '.join(known)}"
+    raise ConfigError(f"{tracker}: is not a tracker: {f'did you mean {close[0]}?' if close else remedy}")
+
+
 def tracker_section(config: Config, tracker: str | Callable[..., Any], options: dict[str, Any]) -> Any:
     """Section of a tracker that is named or given as a function.
 
@@ -94,12 +123,5 @@ def tracker_section(config: Config, tracker: str | Callable[..., Any], options: 
     if callable(tracker):
         return External.model_construct(track=tracker, options=options)
     known = config.tracking.trackers
-    if tracker in known:
-        given = known[tracker].model_dump() | options
-    elif tracker.endswith(".onnx"):
-        given = {"method": "onnx", "model": tracker, **options}
-    elif ":" in tracker:
-        given = {"method": "external", "track": tracker, "options": options}
-    else:
-        given = {"method": tracker, **options}
+    given = known[tracker].model_dump() | options if tracker in known else tracker_values(tracker, options)
     return configure(config, tracking={"trackers": {"tracker": given}}).tracking.trackers["tracker"]

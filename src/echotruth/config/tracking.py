@@ -287,6 +287,12 @@ METHODS: tuple[type[Section], ...] = (
 )
 """Sections of all methods of tracking."""
 
+BUILTIN = tuple(method.model_fields["method"].default for method in METHODS if method not in OUTSIDE)
+"""Names of the methods of echotruth."""
+
+ENTRY_POINT_GROUP = "echotruth.trackers"
+"""Group of entry points under which a package names its trackers."""
+
 DEFAULT = "phase_correlation"
 """Method of a tracker that names none."""
 

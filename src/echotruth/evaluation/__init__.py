@@ -3,6 +3,7 @@
 One clip:
 
     clip                the clip as a tracker receives it
+    points              true motion and strain of the points that trackers follow
     scoring             score of a tracker, made by the next four, and the metrics of the leaderboard
     displacement_error  NRMSE, drift, coverage and other errors of displacement
     agreement           error of strain, by its parts: plane, operator and tracker
@@ -20,8 +21,7 @@ What is read from a repository:
     summary             table of strain: at end-systole, at its peak, time to peak, rate
     tracks              points of the grid, tracked and true
     clip_metrics        table of the metrics of all clips
-    difficulty          how well a clip can be tracked at all
     leaderboard         ranks of the trackers over hearts (paired_ratios), with intervals (resampling)
 
-A tracker from outside, `echotruth evaluate`: run, tracker_options, availability, parallel.
+A tracker from outside, `echotruth evaluate`: tracker_options, availability, parallel.
 """

@@ -4,36 +4,15 @@ import inspect
 import shutil
 import sys
 from contextlib import redirect_stdout
-from difflib import get_close_matches
-from importlib.metadata import entry_points
 
 from echotruth.config.tracking import TRACKER_ARGUMENTS, External, Onnx
-from echotruth.evaluation.tracker_options import BUILTIN, EvaluationError
+from echotruth.evaluation.tracker_options import EvaluationError
+from echotruth.extras import explained
 from echotruth.section import Section
+from echotruth.tracking import trackers
 from echotruth.tracking.failure import TrackerFailed
-from echotruth.tracking.trackers.external import ENTRY_POINT_GROUP, load_callable
+from echotruth.tracking.trackers.external import load_callable
 from echotruth.tracking.trackers.onnx import Model
-
-
-def check_name(tracker: str) -> None:
-    """Check that text can be the name of a tracker.
-
-    Parameters
-    ----------
-    tracker : str
-        A method of echotruth, `package.module:function`, an entry point, or the file of a model in ONNX.
-
-    Raises
-    ------
-    EvaluationError
-        With what was probably meant.
-    """
-    known = [*BUILTIN, *entry_points(group=ENTRY_POINT_GROUP).names]
-    if tracker in known or ":" in tracker or tracker.endswith(".onnx"):
-        return
-    close = get_close_matches(tracker.lower(), known, n=1)
-    remedy = f"write package.module:function or MODEL.onnx, or use one of {', '.join(known)}"
-    raise EvaluationError(f"--tracker {tracker}: is not a tracker: {f'did you mean {close[0]}?' if close else remedy}")
 
 
 def check_runs(settings: Section) -> None:
@@ -42,7 +21,7 @@ def check_runs(settings: Section) -> None:
     Parameters
     ----------
     settings : Section
-        Of the tracker; those of a method of echotruth are checked already.
+        Of the tracker; those of a method of echotruth are checked already, but for the packages that it needs.
 
     Raises
     ------
@@ -51,7 +30,11 @@ def check_runs(settings: Section) -> None:
     """
     if isinstance(settings, Onnx):
         Model(settings)
+        return
     if not isinstance(settings, External):
+        method = settings.method  # type: ignore[attr-defined]  # every tracker has one
+        with explained(f"the tracker {method}"):
+            trackers.function(method)
         return
     if settings.command is not None:
         if shutil.which(settings.command[0]) is None:

@@ -18,7 +18,7 @@ from echotruth.evaluation import point_tracks, reliability, segment_strain
 from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.courses import rate, systolic_rate
 from echotruth.evaluation.curves import REFERENCE
-from echotruth.evaluation.leaderboard import KEYS, SCORES, failures_of, scores_of_guests
+from echotruth.evaluation.leaderboard import KEYS
 from echotruth.evaluation.no_estimate import of_scores, reason
 from echotruth.evaluation.scoring import metrics
 from echotruth.evaluation.segment_strain import Row
@@ -28,7 +28,7 @@ from echotruth.loop.cycle import frame_times
 from echotruth.repository import estimates
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.reader import Repository
-from echotruth.repository.schema import LABELS
+from echotruth.repository.schema import LABELS, SCORES
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
 SORTS = ("heart", "split", "group", "acoustics", "variation")
@@ -101,15 +101,13 @@ def clip_metrics(
 ) -> ClipMetrics:
     """Read the metrics of all clips and trackers; parameters, result and errors: see :meth:`.Repository.metrics`."""
     chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes]
-    guests = scores_of_guests(repository)
-    known = dict.fromkeys([*repository.trackers, *guests["tracker"].unique()])
-    chosen_trackers = chosen("tracker", trackers, known)
+    chosen_trackers = chosen("tracker", trackers, repository.trackers)
     found: tuple[list[Row], list[Row], list[Row]] = ([], [], [])
-    for case, complete in repository.finished(cases, views, "tracking"):
+    for case, complete in repository.finished(cases, views, "truth", "points"):
         for view in complete:
             keys: Row = {"case": case.id, "view": view, "plane": case.config.views[view].plane}
             keys |= _sorts(case)
-            for rows in _of_view(repository, case.id, view, chosen_sizes, chosen_trackers, guests):
+            for rows in _of_view(repository, case.id, view, chosen_sizes, chosen_trackers):
                 for table, more in zip(found, rows, strict=True):
                     table += [keys | row for row in more]
     clips, segments, steps = found
@@ -190,27 +188,19 @@ def track_metrics(displacement: Floats, quality: Floats, truth: ClipTruth) -> di
 
 
 def _of_view(
-    repository: Repository, case: str, view: str, sizes: list[int], trackers: list[str], guests: pd.DataFrame
+    repository: Repository, case: str, view: str, sizes: list[int], trackers: list[str]
 ) -> Iterator[tuple[list[Row], list[Row], list[Row]]]:
     """Rows of the three tables, less those columns that all clips of a view share."""
-    truth, failures = clip_truth(repository, case, view), failures_of(repository, case, view)
-    scored = guests[(guests["case"] == case) & (guests["view"] == view)]
-    told = {(row["size_px"], row["tracker"]): row for row in scored.to_dict("records")}
-    stored = [name for name in repository.trackers if name in trackers]
-    names = ("displacement", "quality", *SCORES, *(f"tracked_{name}" for name in COURSES))
-    for size, tracker, found in estimates.each(repository, case, view, sizes, stored, *names):
+    truth, failures = clip_truth(repository, case, view), estimates.failures(repository, case, view)
+    names = ("displacement", "quality", *(f"tracked_{name}" for name in COURSES), *SCORES)
+    for size, tracker, found in estimates.each(repository, case, view, sizes, trackers, *names):
         keys: Row = {"size_px": size, "tracker": tracker}
-        of_guest = told.pop((size, tracker), {})
-        failure = failures.get((tracker, size), str(of_guest.get("failure", "")))
+        failure = failures.get((tracker, size), "")
         clip, segments, steps = clip_rows(found, truth)
         for row in segments:
             tracked, true = (np.array(row[f"{what}_es_percent"], float) for what in segment_strain.WHAT)
             row["no_estimate"] = reason(tracked, true, repository.config, failure)
         yield [{**keys, "failure": failure, **clip}], [keys | row for row in segments], [keys | step for step in steps]
-    for (size, tracker), row in told.items():
-        if size in sizes and tracker in trackers:
-            values = {name: value for name, value in row.items() if name not in KEYS[:2]}
-            yield [values | _truth_metrics(truth)], [], []
 
 
 def clip_rows(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row]]:

@@ -3,6 +3,7 @@
 import numpy as np
 import xarray as xr
 
+from echotruth.aha import SEGMENT_NAMES
 from echotruth.config import Config
 from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.courses import peak, rate, systolic_rate
@@ -142,11 +143,11 @@ def twist_of(base: xr.Dataset, apex: xr.Dataset, heart_twist: np.ndarray | None 
 
 def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) -> xr.Dataset:
     """Arrays of one clip and their rates, with dimensions, coordinates and units."""
-    arrays = schema.arrays_of("tracking/SIZE")
+    arrays = schema.arrays_of("points") | schema.arrays_of("tracking/TRACKER")
     found: dict[str, tuple[list[str], np.ndarray, dict[str, str]]] = {}
     for name, value in values.items():
         array = arrays[name]
-        dims = [dim for dim in array.dims if dim not in ("tracker", "reference")]
+        dims = [dim for dim in array.dims if dim not in ("size", "reference")]
         order = ["frame", *(dim for dim in dims if dim != "frame")]
         curve = np.asarray(value, float).transpose([dims.index(dim) for dim in order])
         found[name] = (order, curve, {"units": array.units, "long_name": array.long_name})
@@ -161,4 +162,5 @@ def _dataset(values: dict[str, np.ndarray], time: np.ndarray, config: Config) ->
         "aha": np.arange(1, 18),
         "frame": np.arange(len(time)),
     }
-    return data.assign_coords(labels | {"time": ("frame", time, {"units": "s"})})
+    names = {"aha_name": ("aha", list(SEGMENT_NAMES)), "time": ("frame", time, {"units": "s"})}
+    return data.assign_coords(labels | names)

@@ -11,9 +11,7 @@ missing from its mean too, since the mean of its other clips would be too good. 
 of a bootstrap over hearts (:mod:`.resampling`); a single heart has none.
 """
 
-import logging
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -25,19 +23,9 @@ from echotruth.evaluation.resampling import draws, interval, means_of_hearts, ra
 from echotruth.evaluation.scoring import metrics
 from echotruth.repository import estimates, schema
 from echotruth.repository.reader import Repository
-from echotruth.tracking.external_program import in_one_line
-
-log = logging.getLogger("echotruth")
 
 KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
-
-SCORES = tuple(
-    name
-    for name, array in schema.arrays_of("tracking/SIZE").items()
-    if "tracker" in array.dims and "frame" not in array.dims
-)
-"""Arrays from which the metrics are made."""
 
 HEART = "heart"
 """Column that tells the hearts apart."""
@@ -47,12 +35,11 @@ RANKED_BY = "nrmse_all_percent"
 
 
 def rows(repository: Repository) -> pd.DataFrame:
-    """Scores of every clip by every tracker, external ones included, of the hearts that are shown.
+    """Scores of every clip by every tracker, of the hearts that are shown.
 
     Parameters
     ----------
     repository : Repository
-        Its folder `external` holds scores of external trackers.
 
     Returns
     -------
@@ -60,25 +47,20 @@ def rows(repository: Repository) -> pd.DataFrame:
         Columns of `KEYS`, those of :func:`echotruth.evaluation.scoring.metrics`, `failure`: why the tracker failed,
         or ""; and `no_estimate`: why it lacks a strain that the view shows, or "". Without a heart there are no rows,
         and no columns of metrics.
-
-    Raises
-    ------
-    ValueError
-        If a table of an external tracker cannot be read or lacks a column.
     """
     clips = ((case, view) for case in repository.shown for view in repository.views)
-    found = [row for clip in clips for row in _builtin_rows(repository, *clip)]
+    found = [row for clip in clips for row in rows_of(repository, *clip, repository.trackers)]
     ordered = sorted(found, key=lambda row: repository.sizes.index(row["size_px"]))
-    builtin = pd.DataFrame(ordered, columns=None if found else [*KEYS, "failure"])
-    clip, tables = ["case", "view", "size_px"], [builtin]
-    known = pd.MultiIndex.from_frame(builtin[clip])
-    for file in _files_of_guests(repository):
-        table = _external_rows(repository, file, builtin.columns)
-        table = table[~table["tracker"].isin(builtin["tracker"]) & pd.MultiIndex.from_frame(table[clip]).isin(known)]
-        tables += [table] if len(table) else []
-    table, views = pd.concat(tables, ignore_index=True), repository.config.views
-    why = [of_scores(row, views[row["view"]].plane, repository.config) for row in table.to_dict("records")]
-    return table.assign(no_estimate=why)
+    return pd.DataFrame(ordered, columns=None if found else [*KEYS, "failure", "no_estimate"])
+
+
+def rows_of(repository: Repository, case: str, view: str, trackers: Sequence[str]) -> Iterator[dict]:
+    """Rows of one view of a heart by some trackers, those of the largest images first."""
+    failures, plane = estimates.failures(repository, case, view), repository.config.views[view].plane
+    for size, tracker, score in estimates.each(repository, case, view, repository.sizes, trackers, *schema.SCORES):
+        row = dict(zip(KEYS, (case, view, size, tracker), strict=True)) | metrics(score, plane)
+        row["failure"] = failures.get((tracker, size), "")
+        yield row | {"no_estimate": of_scores(row, plane, repository.config)}
 
 
 def standings(rows: pd.DataFrame, seed: int, hearts: Mapping[str, str] | None = None) -> pd.DataFrame:
@@ -151,83 +133,3 @@ def _table(clips: pd.DataFrame, clips_of: pd.Series, resamples: np.ndarray) -> p
     geometric = [f"{RANKED_BY}{end}" for end in ("", "_low", "_high")]
     table[geometric] = np.exp(table[geometric])
     return table.sort_values("rank", kind="stable", na_position="last").reset_index()
-
-
-def failures_of(repository: Repository, case: str, view: str) -> dict[tuple[str, int], str]:
-    """Why trackers of a repository failed on a view of a heart, by tracker and image size; others are not in it."""
-    about = {size: repository.attributes(f"tracking/{size}", case, view) for size in repository.sizes}
-    return {(name, size): why for size, found in about.items() for name, why in found.get("failures", {}).items()}
-
-
-def _builtin_rows(repository: Repository, case: str, view: str) -> Iterator[dict]:
-    """Rows of the repository's own trackers on one view of a heart."""
-    failures, plane = failures_of(repository, case, view), repository.config.views[view].plane
-    own = list(repository.config.tracking.trackers)
-    for size, tracker, score in estimates.each(repository, case, view, repository.sizes, own, *SCORES):
-        keys = dict(zip(KEYS, (case, view, size, tracker), strict=True))
-        yield keys | metrics(score, plane) | {"failure": failures.get((tracker, size), "")}
-
-
-def scores_of_guests(repository: Repository) -> pd.DataFrame:
-    """Scores that `echotruth evaluate` wrote of trackers from outside, on images that have not changed since.
-
-    Scores of trackers that have the name of one of the repository's own do not count.
-
-    Parameters
-    ----------
-    repository : Repository
-
-    Returns
-    -------
-    DataFrame
-        Columns of `KEYS`, the metrics that the tables have, and `failure`.
-
-    Raises
-    ------
-    ValueError
-        If a table cannot be read or lacks a column.
-    """
-    files = [file for file in _files_of_guests(repository) if file.stem not in repository.config.tracking.trackers]
-    tables = [_external_rows(repository, file, _columns(file)) for file in files]
-    return pd.concat([pd.DataFrame(columns=[*KEYS, "failure"]), *(table for table in tables if len(table))])
-
-
-def is_current(repository: Repository, case: str, view: str, version: str) -> bool:
-    """Whether a clip is there in a version (:meth:`.Repository.version`)."""
-    known = case in repository.rows and view in repository.views
-    return known and repository.version(case, view) == version
-
-
-def _files_of_guests(repository: Repository) -> list[Path]:
-    """Tables of scores of trackers from outside."""
-    return [] if repository.is_remote else sorted((repository.folder / "external").glob("*.csv"))
-
-
-def _columns(file: Path) -> pd.Index:
-    """Columns of a table of scores, and those that it must have."""
-    try:
-        given = [str(name) for name in pd.read_csv(file, nrows=0) if name != "clip"]
-    except (ValueError, OSError):  # told where the table is read
-        given = []
-    return pd.Index([*KEYS, *(name for name in given if name not in (*KEYS, "failure")), "failure"])
-
-
-def _external_rows(repository: Repository, file: Path, columns: pd.Index) -> pd.DataFrame:
-    """Scores of an external tracker, named by the file, on clips that have not changed since they were scored."""
-    text = ("case", "view", "tracker", "failure", "clip")
-    types = {name: str if name in text else float for name in (*columns, "clip")} | {"size_px": int}
-    try:
-        # Only an empty number is NaN: a view may be called "null".
-        missing_values = {name: "" for name, kind in types.items() if kind is float}
-        table = pd.read_csv(file, dtype=types, keep_default_na=False, na_values=missing_values)
-    except (ValueError, OSError) as error:
-        raise ValueError(f"{file}: cannot be read ({in_one_line(str(error))}): evaluate that tracker again") from error
-    missing = [name for name in columns if name not in table]
-    if missing:
-        raise ValueError(f"{file}: has no column {missing[0]}: evaluate that tracker again")
-    clips = zip(table["case"], table["view"], table.get("clip", [""] * len(table)), strict=True)
-    current = np.array([is_current(repository, *one) for one in clips], bool)
-    if not current.all():
-        older = f"{(~current).sum()} of {len(current)} rows are of older images or other points"
-        log.warning("external/%s: %s: evaluate that tracker again", file.name, older)
-    return table[current].assign(tracker=file.stem)[list(columns)]

@@ -12,9 +12,9 @@ from echotruth.cases import Case
 from echotruth.config import Config
 from echotruth.config.imaging import ALL_VIEWS
 from echotruth.evaluation.curves import strain_curves, strain_peaks, twist_of, twist_views
-from echotruth.evaluation.leaderboard import failures_of
 from echotruth.evaluation.no_estimate import reason
 from echotruth.evaluation.segment_strain import Row
+from echotruth.repository import estimates
 from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.estimates import NotEvaluated
 from echotruth.repository.reader import Repository
@@ -69,7 +69,7 @@ def strain_summary(
     """Read GLS, GCS, radial strain, rotation and twist of clips into a table; see :meth:`.Repository.summary`."""
     chosen_sizes = [image_size(repository.config, size) for size in sizes or repository.sizes[:1]]
     chosen_trackers = chosen("tracker", trackers, repository.trackers)
-    clips = repository.finished(cases, views, "tracking")
+    clips = repository.finished(cases, views, "points")
     rows = [row for clip in clips for row in _rows(repository, *clip, chosen_sizes, chosen_trackers)]
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
@@ -96,7 +96,7 @@ def _rows(repository: Repository, case: Case, views: list[str], sizes: list[int]
             for view, of_view in curves.items():
                 peaks = strain_peaks(of_view)
                 shown = [quantity for quantity in QUANTITIES if config.views[view].plane in quantity.planes]
-                failure = failures_of(repository, case.id, view).get((tracker, size), "")
+                failure = estimates.failures(repository, case.id, view).get((tracker, size), "")
                 for one in shown:
                     row = keys | {"view": view} | _row(one.name, one.curve, one.place, peaks)
                     rows.append(row | {"no_estimate": _why_none(row, config, failure)})

@@ -7,10 +7,8 @@ from typing import Any
 
 import yaml
 
-from echotruth.config.tracking import METHODS, OUTSIDE, name_of, parse_numbers
-
-BUILTIN = tuple(name_of(method) for method in METHODS if method not in OUTSIDE)
-"""Names of the tracking methods of echotruth."""
+from echotruth.config.building import tracker_values
+from echotruth.config.tracking import BUILTIN, parse_numbers
 
 SCRIPTS = (".py", ".jl", ".m", ".r", ".sh", ".pl", ".js", ".lua")
 """Suffixes of scripts; a program is named after its script rather than the interpreter."""
@@ -40,14 +38,11 @@ def parse_tracker(
     ------
     EvaluationError
         If an option or the command cannot be read, or a timeout is given for a method or a callable.
+    ConfigError
+        If there is no such tracker.
     """
     pairs = dict(map(_option, options))
     limit = {} if timeout is None else {"timeout_s": timeout}
-    if tracker is not None and tracker.endswith(".onnx"):
-        return _identifier(Path(tracker).stem), {"method": "onnx", "model": tracker, **pairs, **limit}
-    if tracker is not None and timeout is not None:
-        remedy = "leave it out, or give a program as --command"
-        raise EvaluationError(f"--timeout {timeout:g}: {tracker} is not timed: {remedy}")
     if tracker is None:
         try:
             words = split(command or "")
@@ -55,9 +50,13 @@ def parse_tracker(
             raise EvaluationError(f"--command {command}: {str(error).lower()}: fix the quotes") from None
         script = next((word for word in words if Path(word).suffix.lower() in SCRIPTS), (words or [""])[0])
         return _identifier(Path(script).stem), {"method": "external", "command": words, "options": pairs, **limit}
-    if tracker in BUILTIN:
-        return tracker, {"method": tracker, **pairs}
-    return _identifier(tracker.removesuffix(":track")), {"method": "external", "track": tracker, "options": pairs}
+    values = tracker_values(tracker, pairs)
+    if values["method"] == "onnx":
+        return _identifier(Path(tracker).stem), values | limit
+    if limit:
+        remedy = "leave it out, or give a program as --command"
+        raise EvaluationError(f"--timeout {timeout:g}: {tracker} is not timed: {remedy}")
+    return tracker if tracker in BUILTIN else _identifier(tracker.removesuffix(":track")), values
 
 
 def _identifier(text: str) -> str:

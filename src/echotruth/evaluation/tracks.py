@@ -7,13 +7,12 @@ import xarray as xr
 
 from echotruth.config import Config
 from echotruth.evaluation.strain import RADIUS, StrainOperator
-from echotruth.imaging.labels import unpack
 from echotruth.repository import estimates
 from echotruth.repository.choice import chosen
 from echotruth.repository.datasets import dataset
 from echotruth.repository.estimates import NotEvaluated
 from echotruth.repository.reader import Repository
-from echotruth.tracking.point_grid import grid_pixels, grid_positions
+from echotruth.tracking.point_grid import grid_positions
 
 _STRAIN, _ABOUT = ("frame", "axial", "lateral", "wall_component"), {"units": "1"}
 
@@ -32,17 +31,14 @@ def tracks(
         except NotEvaluated:
             if trackers is not None:
                 raise
-    true = estimates.true(repository, case, view, "true_displacement", "true_strain", "wall_axes")
+    true = estimates.true(repository, case, view, "true_displacement", "true_strain", "wall_axes", "layer", "segment")
     strain, tracked = _strain(true.pop("wall_axes"), grid, found.config), {}
     for name, arrays in values.items():
-        tracked[name] = dataset(found, {"tracking/SIZE": arrays}, points)
+        tracked[name] = dataset(found, {"tracking/TRACKER": arrays}, points)
         tracked[name]["strain"] = (_STRAIN, strain(arrays["displacement"]), _ABOUT)
-    # As trackers find them, the points are pixel centres of the largest image.
-    labels = unpack(repository.read(f"truth/{repository.sizes[0]}/labels", case, view, 0))
-    at_points = {name: (_STRAIN[1:3], labels[name][grid_pixels(found.config)], _ABOUT) for name in ("layer", "segment")}
     together = xr.concat(list(tracked.values()), xr.Variable("tracker", list(tracked)), combine_attrs="override")
-    truth = dataset(found, {"tracking/SIZE": true}, points)
-    return together.assign(truth.data_vars).assign(at_points).assign_attrs(case=case, view=view, size_px=size)
+    truth = dataset(found, {"points": true}, points)
+    return together.assign(truth.data_vars).assign_attrs(case=case, view=view, size_px=size)
 
 
 def _strain(axes: np.ndarray, grid: np.ndarray, config: Config) -> Callable[[np.ndarray], np.ndarray]:

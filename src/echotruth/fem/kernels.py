@@ -4,7 +4,6 @@ Their results are the same to the last bit. Whoever only reads has few points, a
 """
 
 from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
 
@@ -12,4 +11,10 @@ from types import ModuleType
 @cache
 def kernels() -> ModuleType:
     """The module with the functions `interpolate`, `gradient` and `locate`; imported when it is first asked for."""
-    return import_module(f"echotruth.fem.{'compiled' if find_spec('numba') else 'vectorised'}")
+    if find_spec("numba"):
+        from echotruth.fem import compiled
+
+        return compiled
+    from echotruth.fem import vectorised
+
+    return vectorised

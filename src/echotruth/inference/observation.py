@@ -128,7 +128,7 @@ def seen_of(repository: Repository, case: Case, tracker: str, size: int) -> Iter
     """
     problems, count = [], 0
     for view in repository.views:
-        if problem := repository.problem(case.id, view, "truth", "tracking"):
+        if problem := repository.problem(case.id, view, "truth", "points"):
             problems.append(problem)
             continue
         _check_rotation(case, view)

@@ -30,7 +30,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from echotruth.arrays import Floats
 from echotruth.config.loop import Circulation as Settings
@@ -245,6 +244,8 @@ class Circulation:
         LoopError
             If there is none.
         """
+        from scipy.optimize import brentq  # whoever only checks a loop needs none
+
         if not self.reflex:
             return self, _steady(self, cavity, volumes)
         beat = _steady(self.answered(0.5), cavity, volumes)

@@ -18,7 +18,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
-from echotruth.imaging.truth import pixel_truth
+from echotruth.imaging.truth import pixel_truth, wall_mask
 from echotruth.imaging.view import before_probe
 from echotruth.loop.cycle import heart_cycle
 from echotruth.mechanics.beat import beat as mechanics_beat
@@ -27,8 +27,9 @@ from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.notebook.arguments import check_heart
 from echotruth.repository.choice import image_size
-from echotruth.repository.datasets import as_stored, clip_dataset
+from echotruth.repository.datasets import as_stored, clip_dataset, source_of
 from echotruth.seeds import generator
+from echotruth.tracking.point_grid import grid_positions
 
 
 def beat(config: Source = None, progress: bool = True, *, frames: Iterable[int] | None = None) -> Heart:
@@ -174,7 +175,9 @@ def image(
         f"bmode/{size}": {"image": images[size]},
         f"truth/{size}": pixel_truth(moving, plane, *pixels, tissue),
     }
-    clip = clip_dataset(heart, case, name, plane, as_stored(case, values))
+    points = grid_positions(config)
+    inside = wall_mask(heart, plane, points[:, 0, 1], points[0, :, 0])
+    clip = clip_dataset(case, name, as_stored(case, values), inside, source_of(heart, plane))
     if keep_lines:
         about = {"long_name": "lines, demodulated by exp(-4 pi i f range / c)", "frequency": sequence.scanner.frequency}
         clip["lines"] = (("frame", "line", "range"), lines, about)

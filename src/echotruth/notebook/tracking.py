@@ -10,7 +10,8 @@ import xarray as xr
 
 from echotruth.config.building import tracker_section
 from echotruth.evaluation.clip import Clip, tracker_seed
-from echotruth.evaluation.scoring import metrics, score, truth_at
+from echotruth.evaluation.points import truth_at
+from echotruth.evaluation.scoring import metrics, score
 from echotruth.heart import Heart
 from echotruth.notebook.arguments import check_clip, check_heart, check_whole
 from echotruth.repository.datasets import as_stored, case_of, dataset, imaged_heart
@@ -89,7 +90,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
         warnings.warn(doubt, stacklevel=2)
     displacement, quality = arguments.on_grid(*found)
     coordinates = {"axial": clip["grid_axial"].values, "lateral": clip["grid_lateral"].values}
-    values = {"tracking/SIZE": {"displacement": displacement, "quality": quality}}
+    values = {"tracking/TRACKER": {"displacement": displacement, "quality": quality}}
     return dataset(case, as_stored(case, values), coordinates).assign_attrs(clip.attrs, tracker=_name(tracker))
 
 

@@ -8,9 +8,8 @@ from typing import Any
 import pandas as pd
 
 from echotruth.config.imaging import ALL_VIEWS
-from echotruth.evaluation.leaderboard import failures_of
 from echotruth.evaluation.no_estimate import FAILED
-from echotruth.repository import inferred, status
+from echotruth.repository import estimates, inferred, status
 from echotruth.repository.choice import image_size
 from echotruth.repository.places import STAGES
 from echotruth.repository.reader import Repository
@@ -91,7 +90,7 @@ def _lost(repository: Repository) -> Iterator[dict[str, str]]:
     """Trackers without a result on a clip."""
     for case in repository.shown:
         for view in repository.views:
-            for (tracker, size), reason in failures_of(repository, case, view).items():
+            for (tracker, size), reason in estimates.failures(repository, case, view).items():
                 yield {"tracker": tracker, "clip": f"{case}, {view}, {size} px", "reason": reason}
 
 

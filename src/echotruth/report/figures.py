@@ -168,7 +168,7 @@ class Figures:
 
     @cached_property
     def standings(self) -> pd.DataFrame:
-        """The leaderboard, including external trackers."""
+        """The leaderboard."""
         hearts = {case.id: heart_of(case) for case in self.repository.every.values()}
         return standings(self.repository.scores, self.config.seed, hearts)
 

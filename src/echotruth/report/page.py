@@ -21,6 +21,7 @@ from echotruth.report.hearts import MEASURES, subjects
 from echotruth.repository import inferred
 from echotruth.repository.choice import main_view
 from echotruth.repository.reader import Repository
+from echotruth.repository.version import report_version
 
 HERE = Path(__file__).parent
 
@@ -57,6 +58,7 @@ def _context(repository: Repository) -> dict[str, Any]:
     hearts = subjects(repository, view, config.bmode.sizes[-1]) if shown else []
     return {
         "config": config,
+        "version": report_version(folder),
         "packages": repository.attributes("").get("packages", {}),
         "css": Markup(_colours() + (HERE / "page.css").read_text(encoding="utf-8")),
         "script": Markup((HERE / "player.js").read_text(encoding="utf-8")),

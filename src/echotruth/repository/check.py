@@ -1,7 +1,8 @@
 """Check of a repository: its files against their checksums, every chunk of its arrays, and the values in them."""
 
+import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,14 +10,13 @@ from typing import NamedTuple
 
 from echotruth.config import Config
 from echotruth.repository import group, values
+from echotruth.repository.checksums import CHECKSUMS, METADATA, checksum, files_of, sealed
 from echotruth.repository.group import NotWritten
-from echotruth.repository.metadata import OUTDATED, files_of
-from echotruth.repository.places import METADATA, NOT_NEEDED, group_of, job_of
-from echotruth.repository.publication import CHECKSUMS, checksum, published_files
+from echotruth.repository.places import group_of, job_of, made
+from echotruth.repository.publication import TEXTS, published_checksums
 from echotruth.repository.reader import Repository
 
 REMEDY = "delete {} and run the configuration again"
-TEXTS = ("cases.csv", "config.yaml")
 
 
 class Fault(NamedTuple):
@@ -77,38 +77,70 @@ def check(folder: Path, progress: Callable[[int, int], None] | None = None, quic
 
 
 def _check_files(folder: Path, store: Path, report: Report) -> None:
-    """Compare all files with the list of checksums."""
-    present = {path.relative_to(folder).as_posix(): path for path in published_files(folder, store) if path.is_file()}
-    report.files = len(present)
-    if not (folder / CHECKSUMS).is_file():
-        report.notes.append(f"{folder / CHECKSUMS} is not there: the run has not ended: files have no checksums")
-        return
-    listed = {}
-    for line in (folder / CHECKSUMS).read_text(encoding="utf-8", errors="replace").splitlines():
-        hash, _, name = line.partition("  ")
-        listed[name] = hash
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        hashes = dict(zip(present, pool.map(checksum, present.values()), strict=True))
-    lost = {name: _group_of(name).partition(" ")[0] for name in listed if name not in present}
-    outdated = {place for place in lost.values() if (folder / place / OUTDATED).is_file()}
-    for place in sorted(outdated):
-        problem = "was made with other settings or by other code"
-        report.faults.append(Fault(place, problem, "run the configuration again, which makes it"))
-    for name in sorted(name for name in {*listed, *present} if lost.get(name) not in outdated):
-        if name not in present:
-            report.faults.append(Fault(name, "is missing", REMEDY.format(_group_of(name))))
-        elif name not in listed:
+    """Compare all files with the checksums of the jobs that wrote them, and with those that are published."""
+    published = published_checksums(folder)
+    if not published:
+        report.notes.append(f"{folder / CHECKSUMS} is not there: the run has not ended: what no job wrote is unchecked")
+    made_here = {f"{store.name}/{path}" for path in made(store)}
+    others = {path for path in made_here if published and f"{path}/{METADATA}" not in published}
+    if others:
+        report.notes.append(f"{len(others)} groups are not of the configuration, as {min(others)}: they are unchecked")
+    expected = _expected(folder, made_here - others, published, report)
+    present = {path.relative_to(folder).as_posix() for path in files_of(store) if path.suffix != ".partial"}
+    present = {name for name in present if _job(name) not in others}
+    present |= {name for name in TEXTS if (folder / name).exists()}
+    hashes = _hashes(folder, present & {*expected})
+    report.files = len(hashes)
+    for name in sorted({*expected, *(present if published else ())}):
+        if name not in expected:
             report.faults.append(Fault(name, f"is not listed in {CHECKSUMS}", f"delete it, or {CHECKSUMS}, and run"))
-        elif hashes[name] != listed[name]:
-            report.faults.append(Fault(name, "is not what was written", REMEDY.format(_group_of(name))))
+        elif name not in hashes:
+            report.faults.append(Fault(name, "is missing", REMEDY.format(_made_with(name))))
+        elif hashes[name] != expected[name]:
+            report.faults.append(Fault(name, "is not what was written", REMEDY.format(_made_with(name))))
 
 
-def _group_of(name: str) -> str:
-    """Folder of the group that one job made, of which a file is a part; the checksums if no job made it."""
+def _expected(folder: Path, groups: set[str], published: dict[str, str], report: Report) -> dict[str, str]:
+    """Checksums that the files should have: those of the jobs, or else those that are published."""
+    expected = dict(published)
+    for path in sorted(groups):
+        stored = _stored(folder, path)
+        now = checksum(folder / path / METADATA) if stored else ""
+        if stored and published and now != published[f"{path}/{METADATA}"]:
+            remedy = "run the configuration again, which publishes it, or makes it again"
+            report.faults.append(Fault(path, "is not the one that was published", remedy))
+            expected = {name: hash for name, hash in expected.items() if _job(name) != path}
+            stored[f"{path}/{METADATA}"] = now
+        expected |= stored
+    return expected
+
+
+def _hashes(folder: Path, names: Iterable[str]) -> dict[str, str]:
+    """Checksums of those that are files."""
+    files = [name for name in sorted(names) if (folder / name).is_file()]
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        return dict(zip(files, pool.map(lambda name: checksum(folder / name), files), strict=True))
+
+
+def _stored(folder: Path, group: str) -> dict[str, str]:
+    """Checksums that the job of a group stored in it, by path below the folder; none if they are damaged."""
+    try:
+        found = sealed(json.loads((folder / group / METADATA).read_bytes()))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return {}
+    return {f"{group}/{name}": hash for name, hash in found.items()}
+
+
+def _job(name: str) -> str:
+    """Folder of the group that one job made, of which a file is a part; empty if it is of none."""
     store, _, path = name.partition("/")
-    if group := job_of(path):
-        return f"{store}/{group} and {CHECKSUMS}" if group_of(group) in NOT_NEEDED else f"{store}/{group}"
-    return name if name in TEXTS else CHECKSUMS  # without them the rule repository writes what no job made
+    group = job_of(path)
+    return f"{store}/{group}" if group else ""
+
+
+def _made_with(name: str) -> str:
+    """What is to be deleted so that a file is made again; without checksums, what no job writes is published anew."""
+    return _job(name) or (name if name in TEXTS else CHECKSUMS)
 
 
 def _has_arrays(folder: Path) -> bool:
@@ -117,7 +149,8 @@ def _has_arrays(folder: Path) -> bool:
 
 def _faults(store: Path, place: str, configs: Mapping[str, Config]) -> Iterator[Fault]:
     """What is wrong with a group: chunks that cannot be read, and values that cannot be."""
-    where, remedy = f"{store.name}/{place}", REMEDY.format(_group_of(f"{store.name}/{place}/{METADATA}"))
+    where = f"{store.name}/{place}"
+    remedy = REMEDY.format(_made_with(f"{where}/{METADATA}"))
     try:
         arrays = group.read(store, place)
     except (NotWritten, ValueError, OSError, RuntimeError) as error:

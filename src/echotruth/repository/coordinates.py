@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from echotruth.config import Config
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import frame_times
-from echotruth.repository import schema
+from echotruth.repository import schema, scores
 from echotruth.section import unit_of
 from echotruth.tracking.point_grid import grid_positions
 
@@ -31,9 +31,12 @@ def coordinates_of(group: str, config: Config) -> dict[str, ArrayLike]:
     if stage in ("truth", "bmode"):
         axial, lateral = pixel_centres(config.bmode, int(size))
         found |= {"axial": axial, "lateral": lateral}
-    if stage == "tracking":
+    if stage in ("points", "tracking"):
         points = grid_positions(config)
         found |= {"axial": points[:, 0, 1], "lateral": points[0, :, 0]}
+    if stage == "tracking":
+        shape = config.loop.frames, config.fibres.layers
+        found |= {"size": config.bmode.sizes, "score": scores.labels(*shape), "score_units": scores.units(*shape)}
     if stage == "inference":
         seen = schema.observations(config)
         found |= {

@@ -7,12 +7,12 @@ from hashlib import sha256
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.cases import Case
 from echotruth.config.building import configure
 from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
-from echotruth.imaging.truth import wall_mask
 from echotruth.imaging.view import Plane, moved
 from echotruth.loop.cycle import frame_times
 from echotruth.repository import rounding, schema
@@ -22,35 +22,41 @@ from echotruth.tracking.point_grid import grid_positions
 if TYPE_CHECKING:
     import xarray as xr
 
+SOURCE = ("plane_origin", "plane_axes", "motion")
+"""Attributes of a clip, and of its truth in a repository, that say of what it is the image."""
 
-def clip_dataset(heart: Heart, case: Case, view: str, plane: Plane, values: dict[str, dict[str, Any]]) -> xr.Dataset:
+
+def clip_dataset(
+    case: Case, view: str, values: dict[str, dict[str, Any]], inside: NDArray[np.bool_], source: dict[str, Any]
+) -> xr.Dataset:
     """Clip of one image size with its truth, and all that :func:`echotruth.track` and `evaluate` need.
 
     Parameters
     ----------
-    heart : Heart
     case : Case
     view : str
         Name of the view.
-    plane : Plane
     values : dict of dict of ndarray
         Groups `bmode/SIZE` and `truth/SIZE`, or some of their arrays.
+    inside : ndarray of shape (grid rows, grid columns), bool
+        Which points of the trackers' grid are in the wall at end-diastole.
+    source : dict
+        As :func:`source_of` returns it.
     """
     axial, lateral = pixel_centres(case.config.bmode, int(next(iter(values)).rpartition("/")[2]))
     found = derived(dataset(case, values, {"axial": axial, "lateral": lateral}), case.config)
     grid = grid_positions(case.config)
     lateral, axial = grid[0, :, 0], grid[:, 0, 1]
     about = {"long_name": "whether a point that trackers follow is in the wall at ED", "units": "1"}
-    points = {"grid_mask": (("grid_axial", "grid_lateral"), wall_mask(heart, plane, axial, lateral), about)}
+    points = {"grid_mask": (("grid_axial", "grid_lateral"), inside, about)}
     found = found.assign(points).assign_coords(grid_axial=axial, grid_lateral=lateral)
-    return found.assign_attrs(
-        case=case.id,
-        view=view,
-        plane_origin=plane.origin.tolist(),
-        plane_axes=plane.axes.ravel().tolist(),
-        heart=fingerprint(heart),
-        config=case.config.model_dump_json(),
-    )
+    return found.assign_attrs(case=case.id, view=view, **source, config=case.config.model_dump_json())
+
+
+def source_of(heart: Heart, plane: Plane) -> dict[str, Any]:
+    """Attributes `SOURCE`: origin and axes of the plane, and what tells the motion of the heart from others."""
+    found = plane.origin.tolist(), plane.axes.ravel().tolist(), fingerprint(heart)
+    return dict(zip(SOURCE, found, strict=True))
 
 
 def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -73,7 +79,7 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
     for group, values in groups.items():
         for array in schema.arrays_of(group).values():
             if array.name in values:
-                dims = [dim for dim in array.dims if dim != "tracker"]
+                dims = [dim for dim in array.dims if dim != "size"]
                 about: dict[str, Any] = {"units": array.units, "long_name": array.long_name}
                 step = rounding.quantum(array, case.config)
                 about |= {} if step is None else {"quantum": step}
@@ -93,7 +99,7 @@ def case_of(clip: xr.Dataset) -> Case:
     ValueError
         If the data set has lost its attributes.
     """
-    missing = [name for name in ("case", "config", "view", "plane_origin", "plane_axes") if name not in clip.attrs]
+    missing = [name for name in ("case", "config", "view", *SOURCE[:2]) if name not in clip.attrs]
     if missing:
         raise ValueError(f"The data set has lost its attribute {missing[0]}: keep those that echotruth.image gave it.")
     return Case(clip.attrs["case"], {}, configure(json.loads(clip.attrs["config"])))
@@ -107,7 +113,7 @@ def imaged_heart(clip: xr.Dataset, heart: Heart) -> tuple[Heart, Plane]:
     ValueError
         If the clip was made of another heart.
     """
-    if clip.attrs.get("heart", fingerprint(heart)) != fingerprint(heart):
+    if clip.attrs.get("motion", fingerprint(heart)) != fingerprint(heart):
         raise ValueError("The clip was made of another heart: give the one that was imaged.")
     plane = Plane(np.array(clip.attrs["plane_origin"]), np.reshape(clip.attrs["plane_axes"], (3, 3)))
     config = case_of(clip).config

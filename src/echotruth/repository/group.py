@@ -1,15 +1,17 @@
 """A group of a repository on disk: arrays with their coordinates, units and checksums.
 
-It is made in a folder of its own and moved to its place when it is whole, so that no reader sees a part of it, whatever
-kills the job. Each array is one file, a shard; in it, a chunk is one component of one frame or, of what was tracked, of
-one cycle, so that it can be read alone and its bytes compress together. Chunks carry a crc32c checksum: a flipped bit
-is an error, not a wrong number, and so is a lost file.
+It is made in a folder of its own and moved to its place when it is whole and on the disk, so that no reader sees a
+part of it, whatever kills the job or the machine. Each array is one file, a shard; in it, a chunk is one component of
+one frame or, of what was tracked, of one cycle, so that it can be read alone and its bytes compress together. Chunks
+carry a crc32c checksum: a flipped bit is an error, not a wrong number, and so is a lost or emptied file. Where whole
+arrays are read from a disk, so is a file that is not the one that the job wrote.
 """
 
 from __future__ import annotations
 
+import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -18,15 +20,18 @@ import numpy as np
 import zarr
 from numpy.typing import ArrayLike, NDArray
 from zarr.codecs import BloscCodec, Crc32cCodec, ZstdCodec
+from zarr.storage import LocalStore
 
+from echotruth import files
 from echotruth.config import Config
-from echotruth.repository import rounding, schema
+from echotruth.repository import checksums, remote, rounding, schema
 from echotruth.repository.array import Array
-from echotruth.repository.places import METADATA, group_of
+from echotruth.repository.checksums import METADATA
+from echotruth.repository.places import group_of, job_of
 
 Arrays = dict[str, NDArray[Any]]
 
-COMPONENTS = ("vector", "strain_component", "plane", "wall_component", "label", "to", "tracker", "reference")
+COMPONENTS = ("vector", "strain_component", "plane", "wall_component", "label", "to", "size", "reference")
 """Dimensions along which a chunk holds one element; so it does along `frame`, but for what trackers found."""
 
 SMALL = 4096
@@ -38,6 +43,10 @@ zarr.config.set({"array.write_empty_chunks": True})
 
 class NotWritten(ValueError):
     """Raised if a group, or an array of it, is not there."""
+
+
+class ChecksumError(NotWritten):
+    """Raised if what is there is not what was written."""
 
 
 def write_groups(store: Path, groups: Mapping[str, Callable[[Path], None]]) -> None:
@@ -54,11 +63,14 @@ def write_groups(store: Path, groups: Mapping[str, Callable[[Path], None]]) -> N
     try:
         for path, write in groups.items():
             write(drafts[path])
+            checksums.seal(drafts[path])
+            files.sync_all(drafts[path])
         for path, draft in drafts.items():
             (store / path / METADATA).unlink(missing_ok=True)  # first: what is half removed is no group
             shutil.rmtree(store / path, ignore_errors=True)
             (store / path).parent.mkdir(parents=True, exist_ok=True)
             draft.replace(store / path)
+            files.sync((store / path).parent)
     finally:
         for draft in drafts.values():
             shutil.rmtree(draft, ignore_errors=True)
@@ -91,7 +103,8 @@ def write(
     arrays = {name: array for name, array in schema.arrays_of(group).items() if name in values}
     dims = {dim for array in arrays.values() for dim in array.dims}
     opened = zarr.create_group(folder, zarr_format=3)
-    alone = COMPONENTS if group.startswith("tracking/") else (*COMPONENTS, "frame")
+    is_of_cycle = group == "points" or group.startswith("tracking/")
+    alone = COMPONENTS if is_of_cycle else (*COMPONENTS, "frame")
     for name, array in arrays.items():
         step = rounding.quantum(array, config)
         stored = rounding.rounded(np.asarray(values[name], dtype=array.dtype), step)
@@ -133,9 +146,11 @@ def read(store: Any, path: str, *names: str) -> Arrays:
     Raises
     ------
     NotWritten
-        If the group or an array is not there.
+        If the group or an array is not there, or (ChecksumError) is not as it was written.
     """
     group = open_group(store, path)
+    if isinstance(store, Path):  # first, since Zarr raises many kinds of what is damaged
+        _verify(store, path, names or schema.arrays_of(group_of(path)))
     present = set() if names else set(group.array_keys())
     wanted = names or [name for name in schema.arrays_of(group_of(path)) if name in present]
     for name in wanted:
@@ -145,19 +160,54 @@ def read(store: Any, path: str, *names: str) -> Arrays:
     return {name: part(group[name]) for name in wanted}  # type: ignore[arg-type]  # it is an array
 
 
+def _verify(store: Path, path: str, names: Iterable[str]) -> None:
+    """Compare the files of arrays with the checksums of the job that wrote them, if there are any."""
+    job = job_of(f"{path}/{METADATA}")
+    try:
+        written = checksums.sealed(json.loads((store / job / METADATA).read_bytes()))
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        raise ChecksumError(_damaged(f"{store / job}", "its metadata are not what was written")) from None
+    for name in names if written else ():
+        below = f"{path}/{name}/".removeprefix(f"{job}/")
+        for file, hash in written.items():
+            if file.startswith(below):
+                there = store / job / file
+                if not there.is_file() or checksums.checksum(there) != hash:
+                    raise ChecksumError(_damaged(str(there), "is not what was written"))
+
+
 def part(array: zarr.Array[Any], *index: Any) -> NDArray[Any]:
     """Part of an array, given its indices and slices; all of it without.
 
     Raises
     ------
-    NotWritten
-        If its file is lost, of which Zarr makes fill values.
+    ChecksumError
+        If its file is lost or empty, of which Zarr makes fill values, or damaged.
     """
-    values = np.asarray(array[index or ...])
+    try:
+        values = np.asarray(array[index or ...])
+    except (ValueError, RuntimeError) as error:
+        raise ChecksumError(_damaged(str(array.store_path), f"is damaged ({str(error)[:80]})")) from None
     is_fill = np.isnan(values) if values.dtype.kind == "f" else values == array.fill_value
-    if values.size and np.all(is_fill) and not array.nchunks_initialized:
-        raise NotWritten(f"{array.store_path}: its data are lost: delete the group, and run the configuration again")
+    if values.size and np.all(is_fill) and not _has_file(array):
+        raise ChecksumError(_damaged(str(array.store_path), "has lost its data"))
     return values
+
+
+def _has_file(array: zarr.Array[Any]) -> bool:
+    """Whether the only file of an array is there, and is not empty."""
+    name = "/".join([array.path, "c", *["0"] * array.ndim])
+    if isinstance(array.store, LocalStore):
+        path = array.store.root / name
+        return path.is_file() and path.stat().st_size > 0
+    return remote.size(array.store, name) > 0
+
+
+def _damaged(what: str, problem: str) -> str:
+    remedy = "`echotruth check` of the repository names what is damaged, and what to delete before it is run again"
+    return f"{what} {problem}: {remedy}"
 
 
 def _create(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from functools import cached_property
-from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +15,9 @@ from echotruth.cases import Case, all_cases, find_case
 from echotruth.config import Config, shipped
 from echotruth.config.diagnosis import DECISIVE, bounds_of
 from echotruth.config.loading import load, validate
-from echotruth.extras import explained
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, before_probe, imaging_plane
-from echotruth.repository import estimates, group, metadata, schema, status
+from echotruth.repository import group, metadata, schema, status
 from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
 from echotruth.repository.group import NotWritten
 from echotruth.repository.places import OF_HEART, groups_of, place, repository_folder
@@ -136,7 +134,12 @@ class Repository:
         """All of it as one xarray DataTree, read when used (docs/schema.md): `hearts/HEART`, `clips/CASE/VIEW`."""
         import xarray as xr
 
-        opened = {"engine": "zarr", "zarr_format": 3, "consolidated": False, "create_default_indexes": False}
+        try:
+            zarr.open_group(self.store, mode="r", zarr_format=3, use_consolidated=True)
+            consolidated = True
+        except ValueError:  # it is not finished, or large
+            consolidated = False
+        opened = {"engine": "zarr", "zarr_format": 3, "consolidated": consolidated, "create_default_indexes": False}
         return xr.open_datatree(self.store, **opened)  # type: ignore[arg-type]  # it may be a store
 
     @cached_property
@@ -197,8 +200,8 @@ class Repository:
 
     @property
     def trackers(self) -> list[str]:
-        """Trackers of the configuration, and those of which `echotruth evaluate --keep` kept the motion."""
-        return estimates.trackers(self)
+        """Trackers of the configuration, and those that `echotruth evaluate` added."""
+        return list(self.config.tracking.trackers)
 
     @property
     def _tracker(self) -> str:
@@ -262,15 +265,22 @@ class Repository:
         (('frame', 'to', 'axial', 'lateral', 'vector'), 'm')
         """
         # Here and not above: what they import takes longer than opening a repository.
-        from echotruth.repository.datasets import clip_dataset
+        from echotruth.imaging.labels import unpack
+        from echotruth.repository.datasets import SOURCE, clip_dataset
         from echotruth.repository.derived import stored_names
+        from echotruth.tracking.point_grid import grid_pixels
 
         found, view, size = self.case(case), self.view(view), image_size(self.config, size)
         arrays = {path: schema.arrays_of(path) for path in (f"bmode/{size}", f"truth/{size}")}
         wanted = stored_names(variables, {name for members in arrays.values() for name in members})
         names = {path: [name for name in members if name in wanted] for path, members in arrays.items()}
         values = {path: self.arrays(path, found.id, view, *members) for path, members in names.items() if members}
-        return clip_dataset(self.heart(found.id), found, view, self.plane(found.id, view), values)
+        largest = f"truth/{self.sizes[0]}"
+        at_ed = self.read(f"{largest}/labels", found.id, view, 0)  # only those of frame 0, of which each is a chunk
+        inside, about = unpack(at_ed)["mask"][grid_pixels(found.config)], self.attributes(largest, found.id, view)
+        if not about.keys() >= set(SOURCE):
+            raise NotWritten(f"{self._place}: {found.id} {view} is of an earlier version: run its configuration again")
+        return clip_dataset(found, view, values, inside, {name: about[name] for name in SOURCE})
 
     def tracks(
         self, case: str | None = None, view: str | None = None, size: int | None = None, trackers: Names = None
@@ -335,7 +345,8 @@ class Repository:
         Dataset
             Of `tracked_` and `true_` each, from end-diastole (frame 0): `region_strain` (measure, frame, region,
             wall_component), mean over the points of the whole wall (region 0) or of a layer (1 at the endocardium);
-            `segment_strain` (measure, frame, aha, wall_component), NaN where the view does not show a segment;
+            `segment_strain` (measure, frame, aha, wall_component), NaN where the view does not show a segment,
+            whose name is the coordinate `aha_name`;
             `line_strain` (frame, contour), the relative change of a contour's length, which is circumferential (GCS) in
             a short axis and longitudinal (GLS) in a long axis; `rotation` (frame), rad, counter-clockwise seen from the
             apex, NaN in a long axis; and of each its `_rate`, per second. Measures are `engineering` and
@@ -394,11 +405,11 @@ class Repository:
 
     @property
     def scores(self) -> pd.DataFrame:
-        """Scores of every clip by every tracker, external ones included: the rows from which the leaderboard is made.
+        """Scores of every clip by every tracker: the rows from which the leaderboard is made.
 
         Columns are case, view, size_px, tracker, the metrics of docs/conventions.md, each with its unit in its name,
         `failure`: why the tracker failed, or "", and `no_estimate`: why it lacks a strain that the view shows, or "".
-        There are no rows of a heart of which clips are still missing.
+        There are no rows of clips that are still missing.
         """
         from echotruth.evaluation.leaderboard import rows
 
@@ -465,42 +476,6 @@ class Repository:
         from echotruth.evaluation.clip_metrics import clip_metrics
 
         return clip_metrics(self, cases, views, sizes, trackers)
-
-    def difficulty(self, case: str | None = None, view: str | None = None) -> pd.DataFrame:
-        """Determine with what error a clip can be tracked at best (docs/difficulty.md); what is found is kept.
-
-        Parameters
-        ----------
-        case, view : str, optional
-
-        Returns
-        -------
-        DataFrame
-            A row of each image size: case, view, size_px; `floor_plane_percent`, the NRMSE at end-systole of a perfect
-            tracker of the plane, whose points go from frame to frame with the tissue that is in the plane where they
-            are (forwards and backwards as trackers combine it, and `_forward` and `_backward` alone), and
-            `floor_plane_coverage`, the fraction of the points that it keeps in the wall; `floor_crb_percent`, the
-            Cramer-Rao bound of the error at end-systole over the RMS displacement, for a smooth motion of
-            `crb_parameters` parameters for each component (and each way alone); `floor_percent`, the root of the sum of
-            the squares of both; `crb_step_um`, the bound of a step, RMS over the cycle; and the correlation of echo
-            amplitudes in the wall along the path of that tracker: `correlation_median` and `_least` of consecutive
-            frames, `_closing` of the last with the first, `_es` of end-systole with end-diastole. NaN where images hold
-            no information.
-
-        Examples
-        --------
-        >>> import echotruth as et
-        >>> floors = et.Repository("out/demo").difficulty(view="mid")
-        >>> list(floors.columns[:4])
-        ['case', 'view', 'size_px', 'floor_percent']
-        """
-        found = self.case(case).id, self.view(view)
-        if problem := self.problem(*found, "truth", "bmode"):
-            raise ValueError(problem)
-        with explained("difficulty"):
-            from echotruth.evaluation.difficulty.table import difficulties
-
-            return difficulties(self, [found[0]], [found[1]])
 
     @cached_property
     def every(self) -> dict[str, Case]:
@@ -626,12 +601,6 @@ class Repository:
         except FileNotFoundError:
             return {}
 
-    def version(self, case: str, view: str) -> str:
-        """Version of a view as trackers get it: its images and truth, and the frames and points that are tracked."""
-        found = [self.attributes(f"{stage}/{self.sizes[0]}", case, view).get("version") for stage in ("truth", "bmode")]
-        tracking = self.case(case).config.tracking
-        return sha256(repr((*found, tracking.frame_step, tracking.grid)).encode()).hexdigest()[:16]
-
     def _text(self, name: str) -> str:
         """Content of a text file in the folder."""
         if self._remote:
@@ -651,7 +620,7 @@ def sample() -> Repository:
     Returns
     -------
     Repository
-        Its folder is part of the package; `echotruth merge sample sample` makes a copy that can be written, out/sample.
+        Its folder is in the user's cache; `echotruth merge sample sample` makes a copy that can be written, out/sample.
 
     Examples
     --------

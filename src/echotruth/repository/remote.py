@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from echotruth.extras import installation
 
@@ -106,6 +106,16 @@ def hierarchy(url: str) -> tuple[Remote, ObjectStore]:
     if len(names) != 1:
         raise FileNotFoundError(f"{url}: is not a repository: give an address to which one was uploaded")
     return folder, ObjectStore(Remote(f"{folder.url}/{names[0]}").store, read_only=True)
+
+
+def size(store: Any, name: str) -> int:
+    """Bytes of an object of a hierarchy; 0 if it is not there."""
+    import obstore
+
+    try:
+        return int(obstore.head(store.store, name)["size"])
+    except FileNotFoundError:
+        return 0
 
 
 def _store(url: str) -> S3Store:

@@ -29,6 +29,9 @@ COORDINATES = {array.name: array for array in KINDS.pop("coordinates")}
 DERIVED = KINDS.pop("derived")
 """Arrays that follow from those of a heart; :func:`echotruth.kinematics` computes them."""
 
+SCORES = {array.name: array for array in KINDS.pop("scores")}
+"""Scores of a tracker on a clip by their names; the array `scores` has the numbers of all, one after another."""
+
 HEART = ("geometry", "fibres", "pathology", "mechanics", "kinematics", "physiology")
 """Groups of a heart, which the stage mechanics writes."""
 
@@ -43,9 +46,9 @@ LABELS = {row["array"]: tuple(row["labels"].split()) for row in _ROWS if row["la
 
 
 def kind(group: str) -> str:
-    """Kind of a group: of `truth/512`, `truth/SIZE`."""
-    stage, _, size = group.partition("/")
-    return f"{stage}/SIZE" if size.isdigit() else group
+    """Kind of a group: of `truth/512`, `truth/SIZE`; of `tracking/dis`, `tracking/TRACKER`."""
+    stage, _, name = group.partition("/")
+    return f"{stage}/SIZE" if name.isdigit() else "tracking/TRACKER" if name and stage == "tracking" else group
 
 
 def arrays_of(group: str) -> dict[str, Array]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from echotruth.config import Config
 from echotruth.imaging.labels import TissueLabel, unpack
-from echotruth.repository import rounding, schema
+from echotruth.repository import rounding, schema, scores
 
 Arrays = dict[str, NDArray[Any]]
 """Arrays of a group by name."""
@@ -61,7 +61,7 @@ RANGES = {
 LOWEST_STRAIN = -0.5 - rounding.STRAIN
 """E = (F^T F - I) / 2 along an axis is above -1/2, because F^T F is positive; with the rounding of the store."""
 
-NORMAL_STRAINS = {"kinematics": {"strain": 3}, "truth": {"strain": 3}, "tracking": {"true_strain": 2}}
+NORMAL_STRAINS = {"kinematics": {"strain": 3}, "truth": {"strain": 3}, "points": {"true_strain": 2}}
 """Number of leading components that are strains along an axis."""
 
 
@@ -176,15 +176,26 @@ def _has_flow(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return mask[:, None] & exists[..., None, None]
 
 
-def _tracking(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
-    wall = np.isfinite(arrays["wall_axes"]).all((-2, -1))
-    if bool((np.isfinite(arrays["true_displacement"]).all(-1) != wall).any()):
-        yield "true_displacement", "is not a number at a point of the wall, or is one outside"
+def _points(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+    wall = arrays["layer"] > 0
+    for name, known in {
+        "true_displacement": np.isfinite(arrays["true_displacement"]).all(-1),
+        "wall_axes": np.isfinite(arrays["wall_axes"]).all((-2, -1)),
+        "segment": arrays["segment"] > 0,
+    }.items():
+        if bool((known != wall).any()):
+            yield name, "is not known at a point of the wall, or is outside"
     yield from _still_at_ed("true_displacement", arrays)
     if not _is_one(np.linalg.norm(arrays["wall_axes"][wall], axis=-1)):
         yield "wall_axes", "has axes whose length is not 1 in the wall"
+
+
+def _tracking(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     if bool((np.isfinite(arrays["displacement"]).all(-1) != np.isfinite(arrays["quality"])).any()):
         yield "quality", "is given where there is no displacement, or the reverse"
+    for name, values in scores.unpacked(arrays["scores"], config).items():
+        for problem in _in_range(values, RANGES[schema.SCORES[name].values]):
+            yield name, problem
 
 
 def _still_at_ed(name: str, arrays: Arrays) -> Iterator[tuple[str, str]]:
@@ -204,6 +215,7 @@ RELATIONS: dict[str, Callable[[Arrays, Config], Iterator[tuple[str, str]]]] = {
     "kinematics": _kinematics,
     "phantom": _phantom,
     "truth/SIZE": _truth,
-    "tracking/SIZE": _tracking,
+    "points": _points,
+    "tracking/TRACKER": _tracking,
 }
 """Kind of a group -> faults of its arrays in relation to each other."""

@@ -1,6 +1,7 @@
 """Versions of results: a hash of the settings and the code that a group was made with, and of all before it.
 
-If the version of a group is that of the configuration, so are its bytes. A group has it in its attributes.
+If the version of a group is that of the configuration, so are its bytes. A group has it in its attributes. That of a
+stage is a hash of its settings, its code (:mod:`.code`) and the versions of the stages before it.
 """
 
 import json
@@ -12,12 +13,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from echotruth.config import Config, Geometry, Loop, shipped
+from echotruth.config import Config, Geometry, Loop
 from echotruth.loop.cycle import frame_times, recorded_curves, size
+from echotruth.repository.checksums import CHECKSUMS, checksum
+from echotruth.repository.code import code_hash
 from echotruth.section import Section
-
-PACKAGE = Path(__file__).parents[1]
-"""Folder of echotruth."""
 
 PACKAGES = (
     "echotruth",
@@ -35,40 +35,58 @@ PACKAGES = (
 )
 """Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 
-_ROUNDED = ("repository/rounding.py", "repository/arrays.csv")
-_HEART = (*_ROUNDED, "aha.py", "arrays.py", "fem", "heart.py", "loop", "materials", "mechanics")
-_IMAGING = (*_HEART, "seeds.py", "imaging")
-_TRACKING = (*_IMAGING, "tracking", "evaluation")
-CODE = {
-    "mechanics": _HEART,
-    "phantom": _IMAGING,
-    "rf": _IMAGING,
-    "truth": _IMAGING,
-    "bmode": _IMAGING,
-    "tracking": _TRACKING,
-    "inference": (*_TRACKING, "notebook", "inference"),
-}
-"""Folders and modules of the package on which a stage depends; the configuration and the repository pass numbers on,
-but for their rounding."""
-
-NO_RF = tuple(f"imaging/{name}.py" for name in ("bmode", "truth", "flow", "tracks", "doppler", "packet"))
-"""Modules of imaging that phantom and rf do not use."""
-
-BEFORE = {
+BEFORE: dict[str, tuple[str, ...]] = {
     "mechanics": (),
     "phantom": ("mechanics",),
-    "rf": ("mechanics", "phantom"),
+    "rf": ("phantom",),
     "truth": ("mechanics",),
-    "bmode": ("mechanics", "phantom", "rf"),
-    "tracking": ("mechanics", "phantom", "rf", "truth", "bmode"),
-    "inference": ("mechanics", "phantom", "rf", "truth", "bmode", "tracking"),
+    "bmode": ("rf",),
+    "points": ("mechanics",),
+    "tracking": ("truth", "bmode", "points"),
+    "inference": ("truth", "tracking"),
 }
-"""Stages -> those before them."""
+"""Stages -> those whose groups they read, without those whose version is in that of another one."""
 
 Settings = tuple[Any, ...]
 
 
-def version_of(stage: str, config: Config, view: str | None = None, excluded: str = "") -> str:
+class Versions:
+    """Versions of the groups of one case.
+
+    Parameters
+    ----------
+    config : Config
+        Of the case.
+    excluded : str
+        Why the heart is not imaged, if it is not.
+    """
+
+    def __init__(self, config: Config, excluded: str = "") -> None:
+        self._config, self._excluded = config, excluded
+        self._known: dict[tuple[str | None, ...], str] = {}
+
+    def of(self, stage: str, view: str | None = None, tracker: str | None = None) -> str:
+        """Version of what a stage makes; the parameters are those of :func:`version_of`."""
+        key = stage, None if stage == "mechanics" else view, tracker if stage in ("tracking", "inference") else None
+        if key not in self._known:
+            self._known[key] = self._of(stage, view, tracker)
+        return self._known[key]
+
+    def _of(self, stage: str, view: str | None, tracker: str | None) -> str:
+        if stage == "inference":
+            views, tracker = list(self._config.views), self._config.inference.tracker
+        else:
+            views = [str(view)]
+        before = [self.of(one, name, tracker) for name in views for one in BEFORE[stage]]
+        own = SETTINGS[stage](self._config, str(view), str(tracker)) if stage in SETTINGS else ()
+        code = code_hash(stage, _named(stage, self._config, str(tracker)), _unused(self._config))
+        excluded = "" if stage == "mechanics" else self._excluded
+        return settings_hash(before, own, code, excluded)
+
+
+def version_of(
+    stage: str, config: Config, view: str | None = None, tracker: str | None = None, excluded: str = ""
+) -> str:
     """Version of what a stage makes.
 
     Parameters
@@ -78,6 +96,8 @@ def version_of(stage: str, config: Config, view: str | None = None, excluded: st
         Of the case.
     view : str, optional
         For the stages of a view.
+    tracker : str, optional
+        For tracking.
     excluded : str
         Why the heart is not imaged, if it is not.
 
@@ -85,13 +105,25 @@ def version_of(stage: str, config: Config, view: str | None = None, excluded: st
     -------
     str of 16 hexadecimal digits
     """
-    views = [view] if view is not None else list(config.views) if stage == "inference" else []
-    settings = [SETTINGS[one](config, name) for name in views for one in (*BEFORE[stage], stage) if one in SETTINGS]
-    own: Settings = (config.bmode.sizes[0],) if stage in ("truth", "bmode", "tracking") else ()
-    if stage == "inference":
-        # The table of errors leaves out the rows of the heart itself, by these names.
-        own = config.inference, errors_of(config), config.name, views, config.bmode.sizes[0]
-    return settings_hash(*_motion(config), *_content(config), *settings, *own, excluded, code_hash(stage))
+    return Versions(config, excluded).of(stage, view, tracker)
+
+
+def _named(stage: str, config: Config, tracker: str) -> list[str]:
+    """Modules that a stage imports by a name in the configuration."""
+    if stage in ("mechanics", "inference"):
+        return [f"echotruth.materials.{config.mechanics.material.law}"]
+    if stage == "tracking":
+        return [f"echotruth.tracking.trackers.{config.tracking.trackers[tracker].method}"]  # type: ignore[attr-defined]
+    return []
+
+
+def _unused(config: Config) -> list[str]:
+    """Modules that read files, where the configuration names none."""
+    readers = {
+        "echotruth.mechanics.geometry.file": config.geometry.file is not None,
+        "echotruth.mechanics.motion_file": config.motion.kind == "file",
+    }
+    return [name for name, is_used in readers.items() if not is_used]
 
 
 def settings_hash(*settings: Any) -> str:
@@ -101,21 +133,6 @@ def settings_hash(*settings: Any) -> str:
 
 def _plain(value: Any) -> Any:
     return value.model_dump(mode="json") if isinstance(value, Section) else str(value)
-
-
-@cache
-def code_hash(stage: str) -> str:
-    """Hash of the scripts of a stage and of those before it, and of the files of the package on which it depends."""
-    left_out = {PACKAGE / name for name in NO_RF} if stage in ("phantom", "rf") else set()
-    digest = sha256()
-    for name in (*BEFORE[stage], stage):
-        digest.update((shipped.ROOT / f"workflow/scripts/{name}.py").read_bytes())
-    for part in CODE[stage]:
-        path = PACKAGE / part
-        files = sorted(path.rglob("*")) if path.is_dir() else [path]
-        for file in (file for file in files if file.suffix in (".py", ".csv", ".npz") and file not in left_out):
-            digest.update(file.relative_to(PACKAGE).as_posix().encode() + file.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 def packages() -> dict[str, str]:
@@ -129,6 +146,11 @@ def packages() -> dict[str, str]:
 
         versions["opencv"] = cv2.__version__
     return versions
+
+
+def report_version(folder: Path) -> str:
+    """Version of the report of a repository: of all that is published, and of the code that draws it."""
+    return settings_hash(checksum(folder / CHECKSUMS), code_hash("report"))
 
 
 def motion_hash(config: Config) -> str:
@@ -157,17 +179,26 @@ def _content(config: Config) -> Settings:
     return tuple(found)
 
 
-def _phantom(config: Config, view: str) -> Settings:
+def _mechanics(config: Config, view: str, tracker: str) -> Settings:
+    """What a heart depends on."""
+    return *_motion(config), *_content(config)
+
+
+def _phantom(config: Config, view: str, tracker: str) -> Settings:
     """What the scatterers of a view depend on, and their echoes: the group `rf` has no settings of its own."""
     depth = config.bmode.field_of_view_mm
     levels = config.realism.model_dump(mode="json", exclude={"preset"})
     return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, levels, depth
 
 
-def _truth(config: Config, view: str) -> Settings:
+def _truth(config: Config, view: str, tracker: str) -> Settings:
     """What the truth of a view depends on."""
-    image = config.bmode.field_of_view_mm, config.bmode.size_px
-    return config.views[view], config.rf.focus_mm, *image, *_neighbours(config)
+    return (*_image(config), config.views[view], config.rf.focus_mm, *_neighbours(config))
+
+
+def _image(config: Config) -> Settings:
+    """Side of the images and their pixels; smaller images are made of the largest."""
+    return config.bmode.field_of_view_mm, config.bmode.size_px, config.bmode.sizes[0]
 
 
 def _neighbours(config: Config) -> Settings:
@@ -179,24 +210,39 @@ def _neighbours(config: Config) -> Settings:
     return present, surroundings.start_mm, surroundings.motion_decay_mm, config.probe.resolved(), config.rf
 
 
-def _bmode(config: Config, view: str) -> Settings:
+def _bmode(config: Config, view: str, tracker: str) -> Settings:
     """What the largest images of a view depend on; smaller ones are made of these."""
-    return config.bmode.model_copy(update={"downsampling": (1,)}), config.probe.resolved(), config.rf
+    return config.bmode.model_copy(update={"downsampling": (1,)}), config.bmode.sizes[0]
 
 
-def _tracking(config: Config, view: str) -> Settings:
-    """What trackers find in a view: also what the files hold that a tracker from outside names."""
-    words = [word for tracker in config.tracking.trackers.values() for word in getattr(tracker, "files", [])]
-    return config.seed, config.tracking, [_content_of(Path(word)) for word in words if Path(word).is_file()]
+def _points(config: Config, view: str, tracker: str) -> Settings:
+    """What the true motion of the points depends on."""
+    return (*_image(config), config.views[view], config.rf.focus_mm, config.tracking.grid)
 
 
-SETTINGS: dict[str, Callable[[Config, str], Settings]] = {
+def _tracking(config: Config, view: str, tracker: str) -> Settings:
+    """What a tracker finds in a view: also what the files hold that one from outside names."""
+    settings, tracking = config.tracking.trackers[tracker], config.tracking
+    words = [word for word in getattr(settings, "files", []) if Path(word).is_file()]
+    given = config.seed, config.bmode.sizes, tracking.frame_step, settings
+    return (*given, [_content_of(Path(word)) for word in words])
+
+
+def _inference(config: Config, view: str, tracker: str) -> Settings:
+    """What is inferred: the table of errors leaves out the rows of the heart itself, by these names."""
+    return config.inference, errors_of(config), config.name, list(config.views), config.bmode.sizes[0]
+
+
+SETTINGS: dict[str, Callable[[Config, str, str], Settings]] = {
+    "mechanics": _mechanics,
     "phantom": _phantom,
     "truth": _truth,
     "bmode": _bmode,
+    "points": _points,
     "tracking": _tracking,
+    "inference": _inference,
 }
-"""Stages of a view -> their settings, besides what the stages before them depend on."""
+"""Stages -> their settings, besides what the stages before them depend on."""
 
 
 def errors_of(config: Config) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
+from echotruth.files import user_cache
 from echotruth.repository.choice import Names, chosen
 from echotruth.repository.reader import Repository
 from echotruth.sharing.extraction import in_the_way, members
@@ -90,7 +91,9 @@ class _Release:
         self.source, is_remote = source, "://" in source or source.startswith("doi:")
         key = source if is_remote else str(Path(source).absolute())
         digest = sha256(key.encode()).hexdigest()[:12]
-        self.folder = Path(to).absolute() if to is not None else Path(pooch.os_cache("echotruth"), digest)
+        self.folder = (
+            Path(to).absolute() if to is not None else Path(user_cache() or pooch.os_cache("echotruth"), digest)
+        )
         self.parts_folder = self.folder / ".release" / digest
         self.downloader = None if is_remote else _copy
         tries = 3 if is_remote else 1

@@ -39,8 +39,9 @@ class Clip:
     @cached_property
     def parts(self) -> list[str]:
         """Parts of the clip that were made."""
-        made = [self.repository.attributes(f"{part}/{self.size}", self.case, self.view) for part in PARTS]
-        return [part for part, found in zip(PARTS, made, strict=True) if found.get("status") == "complete"]
+        groups = {part: f"{part}/{self.size}" for part in PARTS} | {"tracking": "points"}
+        made = {part: self.repository.attributes(group, self.case, self.view) for part, group in groups.items()}
+        return [part for part, found in made.items() if found.get("status") == "complete"]
 
     def read(self, path: str, *index: Any) -> NDArray[Any]:
         """Part of an array of this case and view."""
@@ -51,7 +52,7 @@ class Clip:
         return estimates.true(self.repository, self.case, self.view, *names)
 
     def tracked(self, tracker: str, *names: str) -> dict[str, NDArray[Any]]:
-        """What a tracker found, by name; ValueError if one from outside was not evaluated on this clip."""
+        """What a tracker found, by name; ValueError if it was not run on this clip."""
         return estimates.tracked(self.repository, self.case, self.view, tracker, self.size, *names)
 
     @cached_property

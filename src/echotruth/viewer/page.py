@@ -12,7 +12,7 @@ from bokeh.document import Document
 from bokeh.layouts import column, row
 from bokeh.models import CheckboxButtonGroup, ColumnDataSource, Div, Range1d, Select, Slider, Toggle
 
-from echotruth.evaluation.leaderboard import failures_of
+from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
@@ -266,7 +266,7 @@ class Page:
             "volume": curves.volume(clip),
         }
         for tracker in found:
-            failure = failures_of(self.repository, clip.case, clip.view).get((tracker, clip.size), "")
+            failure = estimates.failures(self.repository, clip.case, clip.view).get((tracker, clip.size), "")
             if why := curves.no_estimate(clip, plots["strain"], tracker, failure):
                 self._problems[f"{tracker} has no estimate of this strain: {why}."] = None
         for name, plot in plots.items():

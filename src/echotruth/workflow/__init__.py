@@ -20,4 +20,5 @@ What `echotruth run`, `status` and other commands do:
     concerns      what speaks against a run
     status        how a repository is getting on
     merging       hearts and clips of other repositories, copied
+    added_tracker a tracker added to a repository, and run on its clips
 """

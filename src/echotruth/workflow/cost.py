@@ -5,11 +5,11 @@ from math import ceil
 from echotruth.config import Config
 
 SECONDS = {
-    **{"mechanics": 60, "phantom": 2, "rf": 45, "truth": 12, "bmode": 4, "tracking": 8, "inference": 90},
+    **{"mechanics": 60, "phantom": 2, "rf": 45, "truth": 12, "bmode": 4, "points": 2, "tracking": 12, "inference": 90},
     **{"repository": 3, "report": 12},
 }
 """CPU time of a job of each rule for the default heart (40 frames, 512 px), s, on a core of an Intel Xeon (model 167);
-of tracking, that of a tracker in the largest image."""
+of tracking, that of a tracker in three sizes."""
 MEGABYTES = {
     **{
         "mechanics": 900,
@@ -17,6 +17,7 @@ MEGABYTES = {
         "rf": 1100,
         "truth": 1500,
         "bmode": 1100,
+        "points": 600,
         "tracking": 1200,
         "inference": 1200,
     },
@@ -29,22 +30,14 @@ FILE_CELLS = 60_000
 """Tetrahedra assumed in a mesh from a file, whose size is not known before it is read."""
 MEGABYTES_OF_FRAME = 1.2
 """Size on disk of a frame of a view of the default heart, in three sizes, MB, with its lines and six trackers."""
-FILES_OF_HEART, FILES_OF_VIEW, FILES_OF_SIZE = 187, 43, 163
-"""Files of a heart, of a view, and of a view more for each image size (docs/size.md)."""
+FILES_OF_HEART, FILES_OF_VIEW, FILES_OF_SIZE, FILES_OF_TRACKER = 205, 105, 40, 41
+"""Files of a heart, of a view, and of a view more for each image size and for each tracker (docs/size.md)."""
 
 
-def scale(rule: str, config: Config, size: int = 0) -> float:
-    """Work of a job over that for the default heart.
-
-    Parameters
-    ----------
-    rule : str
-    config : Config
-    size : int
-        Image size, px, for the rules that have a job for each. Default: the largest.
-    """
+def scale(rule: str, config: Config) -> float:
+    """Work of a job over that for the default heart."""
     geometry, frames = config.geometry, config.loop.frames / FRAMES
-    pixels = (size or max(config.bmode.sizes)) ** 2 / PIXELS
+    pixels = max(config.bmode.sizes) ** 2 / PIXELS
     if rule == "mechanics":
         elements = geometry.circumferential_elements * geometry.longitudinal_elements * geometry.transmural_elements
         cells = FILE_CELLS if geometry.file and not geometry.remesh else 5 * elements
@@ -54,17 +47,19 @@ def scale(rule: str, config: Config, size: int = 0) -> float:
         return frames * config.probe.elements / 64 * (2 if config.realism.surroundings.level_dB is not None else 1)
     if rule in ("truth", "bmode"):
         return frames * pixels
-    return frames * (0.1 + 0.9 * pixels) * len(config.tracking.trackers) if rule == "tracking" else 1.0
+    if rule == "tracking":
+        return frames * sum(0.1 + 0.9 * size**2 / PIXELS for size in config.bmode.sizes) / 1.5
+    return frames if rule == "points" else 1.0
 
 
-def seconds(rule: str, config: Config, size: int = 0) -> float:
-    """CPU time of a job, s; the parameters are those of :func:`scale`."""
-    return 1.0 + SECONDS[rule] * scale(rule, config, size)
+def seconds(rule: str, config: Config) -> float:
+    """CPU time of a job, s."""
+    return 1.0 + SECONDS[rule] * scale(rule, config)
 
 
-def megabytes(rule: str, config: Config, size: int = 0) -> float:
-    """Peak memory of a job, MB; the parameters are those of :func:`scale`."""
-    return MEGABYTES[rule] * max(0.5, scale(rule, config, size) / (6 if rule == "tracking" else 1)) ** 0.7
+def megabytes(rule: str, config: Config) -> float:
+    """Peak memory of a job, MB."""
+    return MEGABYTES[rule] * max(0.5, scale(rule, config)) ** 0.7
 
 
 def resources(rule: str, config: Config) -> dict[str, int]:
@@ -89,30 +84,30 @@ def jobs(config: Config, hearts: int, cases: int) -> dict[str, int]:
         A heart may serve several cases.
     """
     views = cases * len(config.views)
-    found = {"mechanics": hearts, "phantom": views, "rf": views, "truth": views, "bmode": views}
-    found["tracking"] = views * len(config.bmode.sizes)
+    found = {"mechanics": hearts} | dict.fromkeys(("phantom", "rf", "truth", "bmode", "points"), views)
+    found["tracking"] = views * len(config.tracking.trackers)
     return found | ({"inference": cases} if config.inference.tracker else {}) | {"repository": 1, "report": 1}
 
 
 def chain(config: Config) -> float:
     """Time of the longest chain of jobs that wait for each other, s: no number of cores makes a run shorter."""
     took = {rule: seconds(rule, config) for rule in jobs(config, 1, 1)}
-    # Tracking waits for both, which are made side by side.
-    return sum(took.values()) - min(took["truth"], took["phantom"] + took["rf"] + took["bmode"])
+    images, beside = took["phantom"] + took["rf"] + took["bmode"], (took["truth"], took["points"])
+    return sum(took.values()) - images - sum(beside) + max(images, *beside)
 
 
 def table(config: Config, hearts: int, cases: int, cores: int) -> str:
     """What a run will take, a line for each rule: jobs and CPU time, and what the repository takes on disk."""
     lines, total = [f"{'':13} {'jobs':>7} {'CPU time':>9}"], 0.0
     for rule, number in jobs(config, hearts, cases).items():
-        sizes = config.bmode.sizes if rule == "tracking" else [0]
-        took = number / len(sizes) * sum(seconds(rule, config, size) for size in sizes)
+        took = number * seconds(rule, config)
         lines.append(f"{rule:13} {number:>7} {duration(took):>9}")
         total += took
     views = cases * len(config.views)
     size_MB = views * config.loop.frames * MEGABYTES_OF_FRAME * max(config.bmode.sizes) ** 2 / PIXELS
     disk = f"{size_MB / 1e3:.1f} GB" if size_MB >= 1e3 else f"{size_MB:.0f} MB"
-    number = hearts * FILES_OF_HEART + views * (FILES_OF_VIEW + FILES_OF_SIZE * len(config.bmode.sizes))
+    of_view = FILES_OF_VIEW + FILES_OF_SIZE * len(config.bmode.sizes) + FILES_OF_TRACKER * len(config.tracking.trackers)
+    number = hearts * FILES_OF_HEART + views * of_view
     took = max(total / cores, chain(config))
     lines += ["", f"Time: {duration(total)} of CPU time, about {duration(took)} on {cores} cores"]
     lines += [f"Disk: {disk}, about {number} files", "Based on the default heart on a core of an Intel Xeon"]

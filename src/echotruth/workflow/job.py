@@ -1,4 +1,4 @@
-"""Execution of one stage for a heart, a view or an image size.
+"""Execution of one stage for a heart, for a view, or for a tracker in a view.
 
 A stage is a script: it reads the configuration of its case and the groups that are inputs of its rule, calls one
 function, and writes groups. A group is moved to its place when it is whole; a job that was killed leaves none.
@@ -29,7 +29,7 @@ from echotruth.repository.version import version_of
 from echotruth.seeds import generator
 from echotruth.workflow import lock
 from echotruth.workflow.failure import CaseFailed
-from echotruth.workflow.processes import lock_cache_writes
+from echotruth.workflow.processes import guard_cache
 
 Result = Mapping[str, Mapping[str, ArrayLike]]
 """Arrays, and coordinates of their own, by group."""
@@ -67,7 +67,7 @@ def read_case(folder: Path, case: str) -> Case:
 
 
 class Job:
-    """Inputs and results of one stage for one case, view and image size.
+    """Inputs and results of one stage for one case, view and tracker.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ class Job:
         Id of the case; of mechanics, of any that has the heart.
     view : str, optional
         Name of the view, for stages that are run per view.
-    size : int, optional
-        Image size, px, for tracking.
+    tracker : str, optional
+        Name of the tracker, for tracking.
 
     Attributes
     ----------
@@ -89,8 +89,10 @@ class Job:
         Further attributes of the groups that are written.
     """
 
-    def __init__(self, folder: Path, stage: str, case: str, view: str | None = None, size: int | None = None) -> None:
-        self.folder, self.stage, self.view_name, self.size = folder, stage, view, size or 0
+    def __init__(
+        self, folder: Path, stage: str, case: str, view: str | None = None, tracker: str | None = None
+    ) -> None:
+        self.folder, self.stage, self.view_name, self.tracker = folder, stage, view, tracker
         self.case: Case = read_case(folder, case)
         self.config = self.case.config
         self.store = folder / f"{self.config.name}.zarr"
@@ -117,9 +119,14 @@ class Job:
         return self._before_probe[1]
 
     @cached_property
-    def _before_probe(self) -> tuple[Heart, Plane]:
+    def solved(self) -> Heart:
+        """Solved heart of this case, as it moves in the heart frame."""
         groups = {name: self.read(name) for name in ("geometry", "fibres", "pathology", "mechanics")}
-        return before_probe(Heart.of(groups, self.config), self.config, str(self.view_name))
+        return Heart.of(groups, self.config)
+
+    @cached_property
+    def _before_probe(self) -> tuple[Heart, Plane]:
+        return before_probe(self.solved, self.config, str(self.view_name))
 
     def read(self, name: str, *arrays: str) -> dict[str, Any]:
         """Arrays of a group for this case (and view), all if none is named."""
@@ -139,11 +146,11 @@ class Job:
     @cached_property
     def version(self) -> str:
         """What the groups are made with; to be asked for first, as code and files may change while the job works."""
-        return version_of(self.stage, self.config, self.view_name, self.excluded)
+        return version_of(self.stage, self.config, self.view_name, self.tracker, self.excluded)
 
     def groups(self) -> list[str]:
         """Groups that this job writes: those of which Snakemake knows."""
-        return groups_of(self.stage, [self.size] if self.size else self.config.bmode.sizes)
+        return groups_of(self.stage, self.config.bmode.sizes, self.tracker)
 
     def write(self, result: Result) -> None:
         """Write the groups of a result, each as a whole."""
@@ -192,9 +199,9 @@ def main(stage: str, work: Work, description: str | None) -> None:
         sys.exit(f"{stage}: {error}")
     if job.view_name is not None and job.view_name not in job.config.views:
         sys.exit(f"{stage}: {job.view_name} is not a view of {job.folder}: use {', '.join(job.config.views)}")
-    if job.size and job.size not in job.config.bmode.sizes:
-        sizes = ", ".join(map(str, job.config.bmode.sizes))
-        sys.exit(f"{stage}: {job.size} is not an image size of {job.folder}: use {sizes}")
+    if job.tracker is not None and job.tracker not in job.config.tracking.trackers:
+        known = ", ".join(job.config.tracking.trackers)
+        sys.exit(f"{stage}: {job.tracker} is not a tracker of {job.folder}: use {known}")
     run(job, work)
 
 
@@ -222,10 +229,10 @@ def run(job: Job, work: Work) -> None:
 
 def _prepare(threads: int, place: str) -> None:
     """Give the log the name of a job, and its number of threads to Numba if the stage has compiled functions."""
-    if "numba" in sys.modules:
+    if sys.modules.get("numba"):
         import numba
 
-        lock_cache_writes()
+        guard_cache()
         numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
         logging.getLogger("numba").setLevel(logging.WARNING)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
@@ -239,6 +246,6 @@ def _parser(stage: str, description: str | None) -> argparse.ArgumentParser:
     if stage not in OF_HEART:
         parser.add_argument("view", help="name of the view")
     if stage == "tracking":
-        parser.add_argument("size", type=int, help="image size in pixels")
+        parser.add_argument("tracker", help="name of the tracker")
     parser.add_argument("--threads", type=int, default=1, help="number of threads; results do not depend on it")
     return parser

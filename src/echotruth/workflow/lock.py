@@ -3,6 +3,8 @@
 import fcntl
 import os
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -48,6 +50,18 @@ def hold(folder: Path) -> bool:
     _held.append(file)  # closed, and so released, with this process
     os.environ[VARIABLE] = str(folder.absolute())
     return True
+
+
+@contextmanager
+def held(folder: Path) -> Iterator[None]:
+    """Lock a folder for a while; LockError if another run holds it."""
+    before, is_new = len(_held), hold(folder)
+    try:
+        yield
+    finally:
+        if is_new:
+            os.environ.pop(VARIABLE)
+            _held.pop(before).close()
 
 
 def share(folder: Path) -> None:

@@ -4,9 +4,14 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from echotruth.repository.places import METADATA
-from echotruth.repository.publication import CHECKSUMS
+from echotruth import files
+from echotruth.repository.check import check
+from echotruth.repository.checksums import CHECKSUMS, METADATA
 from echotruth.workflow.plan import Plan
+
+
+class Damaged(ValueError):
+    """Raised if a repository is not as it was written, so that nothing is taken from it."""
 
 
 def merge(plan: Plan, sources: Sequence[Path]) -> int:
@@ -23,21 +28,36 @@ def merge(plan: Plan, sources: Sequence[Path]) -> int:
     -------
     int
         Number of hearts, clips and inferences that were copied.
+
+    Raises
+    ------
+    Damaged
+        If a file of a repository is not what was written.
     """
+    for folder in sources:
+        if faults := check(folder, quick=True).faults:
+            raise Damaged(f"{folder} is damaged, so that nothing is copied: {faults[0]} (echotruth check {folder})")
     clips = [f"clips/{case}/{view}" for case in plan.cases for view in plan.config.views]
     places = [*(f"hearts/{heart}" for heart in plan.hearts), *clips, *(f"inference/{case}" for case in plan.cases)]
     copied = 0
     for place in places:
         found = [store / place for folder in sources for store in folder.glob("*.zarr") if (store / place).is_dir()]
-        if found and not (plan.store / place).exists():
+        if found and _is_empty(plan.store / place):
             draft = plan.folder / "drafts" / "merged"
             shutil.rmtree(draft, ignore_errors=True)  # of a merge that was killed
             shutil.copytree(found[0], draft)
             if place.startswith("clips/"):
                 (draft / METADATA).unlink(missing_ok=True)  # the rule repository writes it
+            files.sync_all(draft)
             (plan.store / place).parent.mkdir(parents=True, exist_ok=True)
+            shutil.rmtree(plan.store / place, ignore_errors=True)
             draft.replace(plan.store / place)
             copied += 1
     if copied:
         (plan.folder / CHECKSUMS).unlink(missing_ok=True)  # so that the rule repository writes them
     return copied
+
+
+def _is_empty(folder: Path) -> bool:
+    """Whether a folder holds no array: it is not there, or has only the groups that are to hold what will be made."""
+    return not any(folder.glob("**/c"))

@@ -7,10 +7,12 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from echotruth.repository.places import METADATA, NOT_NEEDED, OF_HEART, STAGES, groups_of
-from echotruth.repository.publication import CHECKSUMS
+from echotruth.config import Config
+from echotruth.repository.checksums import CHECKSUMS, METADATA
+from echotruth.repository.places import NOT_NEEDED, OF_HEART, STAGES, groups_of
 from echotruth.repository.reader import Repository
 from echotruth.workflow import lock
+from echotruth.workflow.concerns import concerns
 
 MAX_SHOWN = 10
 """Largest number of hearts that are named with their reasons."""
@@ -57,7 +59,9 @@ def _infers(repository: Repository) -> bool:
 
 def _done(repository: Repository, store: Path, stage: str) -> tuple[int, int]:
     """Number of the groups of a stage that are made, and of all."""
-    views, groups = [None] if stage in OF_HEART else repository.views, groups_of(stage, repository.sizes)
+    views = [None] if stage in OF_HEART else repository.views
+    trackers = repository.trackers if stage == "tracking" else [""]
+    groups = [group for tracker in trackers for group in groups_of(stage, repository.sizes, tracker)]
     places = {repository.path(*one) for one in product(groups, repository.present, views)}
     return sum((store / place / METADATA).is_file() for place in places), len(places)
 
@@ -68,6 +72,11 @@ def text(status: dict[str, Any]) -> str:
     lines = [f"{status['repository']}: {states[status['state']]}", ""]
     lines += [f"{stage:13}{f'{done}/{number}':>12}" for stage, (done, number) in status["jobs"].items()]
     return "\n".join([*lines, "", *verdicts(status)])
+
+
+def conclusion(config: Config, folder: Path) -> list[str]:
+    """What is to be known at the end of a run: what speaks against its images, and which hearts have no result."""
+    return [*(f"warning: {concern.text}" for concern in concerns(config)), *verdicts(status_of(folder))]
 
 
 def verdicts(status: dict[str, Any]) -> list[str]:

@@ -10,6 +10,7 @@ from shutil import copytree
 import pytest
 import yaml
 from described_repository import GIVEN, REASON, SWEEP
+from finished_repository import made_otherwise
 
 from echotruth.repository.check import check
 from echotruth.repository.reader import Repository
@@ -123,9 +124,8 @@ def lose_file(folder):
     next(path for path in folder.glob("small.zarr/clips/*/mid/bmode/64/image/c/**/*") if path.is_file()).unlink()
 
 
-def set_aside(folder):
-    group = next(folder.glob("small.zarr/clips/*/mid/bmode/64/zarr.json"))
-    group.rename(group.with_name("outdated.json"))
+def make_otherwise(folder):
+    made_otherwise(next(folder.glob("small.zarr/clips/*/mid/bmode/64")))
 
 
 def drop_checksums(folder):
@@ -136,7 +136,7 @@ def drop_checksums(folder):
     ("harm", "sentence"),
     [
         (lose_file, r"is not finished, or damaged \(small.zarr/clips/.*/image/.* is missing: .*\): .* echotruth check"),
-        (set_aside, r"is not finished, or damaged \(small.zarr/clips/.*/bmode/64 was made with other settings"),
+        (make_otherwise, r"is not finished, or damaged \(small.zarr/clips/.*/zarr.json is not what was written"),
         (drop_checksums, r"is not finished, or damaged \(.*SHA256SUMS is not there: the run has not ended"),
     ],
 )
@@ -146,6 +146,15 @@ def test_what_is_damaged_or_not_finished_is_not_described(finished, tmp_path, ha
     with pytest.raises(DescriptionError, match=sentence) as told:
         describe(Repository(folder))
     assert "\n" not in str(told.value) and not any((folder / document).exists() for document in DOCUMENTS)
+
+
+def test_group_that_the_configuration_does_not_ask_for_is_no_part_of_what_is_described(finished, tmp_path):
+    folder = copytree(finished, tmp_path / "small")
+    view = next(folder.glob("small.zarr/clips/*/mid"))
+    copytree(view / "tracking/one", view / "tracking/former")
+    describe(Repository(folder), tmp_path / "found")
+    describe(Repository(finished), tmp_path / "expected")
+    assert contents(tmp_path / "found") == contents(tmp_path / "expected")
 
 
 def test_command_prints_what_it_wrote_or_one_sentence(finished, tmp_path, capsys, monkeypatch):

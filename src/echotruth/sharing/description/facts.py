@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from echotruth.repository.check import check
-from echotruth.repository.publication import CHECKSUMS
+from echotruth.repository.checksums import CHECKSUMS
 from echotruth.repository.reader import Repository
 from echotruth.repository.status import ALWAYS, is_label
 from echotruth.sharing.description.attribution import Attribution, Author
@@ -76,7 +76,8 @@ class Facts:
 def read_facts(repository: Repository, given: Attribution) -> Facts:
     """Read what is to be known of a repository; DescriptionError if it is not finished, or damaged."""
     folder, report = repository.folder, check(repository.folder, quick=True)
-    if problems := [*report.notes, *map(str, report.faults)]:
+    unpublished = [] if (folder / CHECKSUMS).is_file() else report.notes
+    if problems := [*unpublished, *map(str, report.faults)]:
         remedy = f"run its configuration to its end; echotruth check {folder} lists all faults"
         raise DescriptionError(f"{folder}: is not finished, or damaged ({problems[0]}): {remedy}")
     authors = given.authors or (Author(f"The authors of the repository {repository.config.name}"),)

@@ -102,7 +102,7 @@ def _tracked(curves: xr.Dataset) -> Iterator[pd.DataFrame]:
     places = {"region": lambda number: f"layer_{number}" if number else "wall", "aha": "segment_{:02d}".format}
     for quantity in ("region_strain", "segment_strain", "line_strain", "rotation"):
         pair = xr.Dataset({kind: curves[f"{kind}_{quantity}"] for kind in ("tracked", "true")})
-        table = pair.drop_vars("time").to_dataframe().reset_index()
+        table = pair.reset_coords(drop=True).to_dataframe().reset_index()
         for dim, name in places.items():
             if dim in table:
                 table["place"] = table[dim].map(name)

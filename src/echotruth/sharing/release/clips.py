@@ -15,12 +15,12 @@ def clips_of(repository: Repository, case: str, view: str) -> dict[str, bytes]:
     ----------
     repository : Repository
     case, view : str
-        Of which the tracking is finished.
+        Of which the images, the truth and the points are made.
     """
     es = int(repository.read("mechanics/es_frame", case))
     found = {}
     for size, clip in read_clips(repository, case, view).items():
-        true = repository.arrays(f"tracking/{size}", case, view, "true_displacement")["true_displacement"]
+        true = repository.arrays("points", case, view, "true_displacement")["true_displacement"]
         arrays = {
             "frames": clip.frames,
             "mask": clip.mask,

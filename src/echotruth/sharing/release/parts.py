@@ -12,18 +12,17 @@ from functools import cached_property
 from hashlib import sha256
 from io import StringIO
 from pathlib import Path, PurePosixPath
-from zipfile import ZIP_STORED, ZipFile, ZipInfo
+from zipfile import ZipFile
 
+from echotruth.archive import append
+from echotruth.repository.checksums import CHECKSUMS, checksum
 from echotruth.repository.places import DEPTHS
-from echotruth.repository.publication import CHECKSUMS, checksum, published_files
+from echotruth.repository.publication import published_checksums
 from echotruth.repository.reader import Repository
 from echotruth.sharing.release.clips import clips_of
 
 STRUCTURE, HEARTS, CLIPS = "structure", "hearts", "clips"
 """What a part holds; clips are NumPy archives for whoever reads no Zarr."""
-
-EPOCH = (1980, 1, 1, 0, 0, 0)
-"""Earliest time that a .zip can have."""
 
 Files = dict[str, bytes | Path]
 """Name in an archive -> content, or the file that has it."""
@@ -51,12 +50,9 @@ class Part:
 
     def add(self, cases: list[str], files: Files) -> None:
         """Append files of some cases, given their names in the archive."""
-        with ZipFile(self.path, "a", ZIP_STORED) as archive:
+        with ZipFile(self.path, "a") as archive:
             for name, content in files.items():
-                about = ZipInfo(name, EPOCH)
-                about.external_attr = 0o644 << 16
-                about.create_system = 3  # the same on every system
-                archive.writestr(about, content if isinstance(content, bytes) else content.read_bytes())
+                append(archive, name, content if isinstance(content, bytes) else content.read_bytes())
         self.size += size_of(files)
         self.cases += [case for case in cases if case not in self.cases]
 
@@ -97,9 +93,9 @@ def write_parts(repository: Repository, folder: Path, limit: int) -> list[Part]:
 
 def folders_of(repository: Repository) -> dict[str, Files]:
     """Files that have a checksum by the folder below the store that a job made, "" for those that no job made."""
-    home, store = repository.folder, Path(str(repository.store))
+    home = repository.folder
     found: dict[str, Files] = {"": {}}
-    for path in [*published_files(home, store), home / CHECKSUMS]:
+    for path in (home / name for name in [*published_checksums(home), CHECKSUMS]):
         names = PurePosixPath(path.relative_to(home)).parts[1:]
         depth = DEPTHS.get(names[0], 0) if names else 0
         place = "/".join(names[:depth]) if len(names) > depth else ""
@@ -108,20 +104,18 @@ def folders_of(repository: Repository) -> dict[str, Files]:
 
 
 def by_case(repository: Repository, folders: dict[str, Files]) -> Iterator[tuple[list[str], Files]]:
-    """Each folder with the cases whose arrays are in it, in the order of the cases; last those of no case any more."""
+    """Each folder with the cases whose arrays are in it, in the order of the cases."""
     owners: dict[str, list[str]] = {}
     for case, heart in repository.parameters["heart"].items():
         clips = [f"clips/{case}/{view}" for view in repository.views]
         for place in (f"hearts/{heart}", *clips, f"inference/{case}"):
             owners.setdefault(place, []).append(str(case))
-    for place in dict.fromkeys([*owners, *folders]):
-        if place in folders:
-            yield owners.get(place, []), folders[place]
+    yield from ((cases, folders[place]) for place, cases in owners.items() if place in folders)
 
 
 def clip_files(repository: Repository) -> Iterator[tuple[list[str], Files]]:
-    """The archives of the clips of each view that was tracked."""
-    for case, views in repository.finished(None, None, "mechanics", "truth", "bmode", "tracking"):
+    """The archives of the clips of each view."""
+    for case, views in repository.finished(None, None, "mechanics", "truth", "bmode", "points"):
         for view in views:
             yield [case.id], {f"clips/{name}": text for name, text in clips_of(repository, case.id, view).items()}
 

@@ -13,14 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.config.tracking import TRACKER_ARGUMENTS, External
+from echotruth.config.tracking import ENTRY_POINT_GROUP, TRACKER_ARGUMENTS, External
 from echotruth.tracking import external_program
 from echotruth.tracking.external_program import check_real, in_one_line
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker_input import TrackerInput
-
-ENTRY_POINT_GROUP = "echotruth.trackers"
-"""Group of entry points under which a package names its trackers."""
 
 QUALITY_TOLERANCE = 1e-6
 """Distance of a quality outside 0 to 1 that is accepted as rounding in single precision."""

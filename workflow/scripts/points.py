@@ -1,0 +1,12 @@
+"""True motion of the points that trackers follow in one view, and of the contours of its wall."""
+
+from echotruth.evaluation.points import ground_truth
+from echotruth.workflow.job import Job, Result, main
+
+
+def work(job: Job) -> Result:
+    return {"points": ground_truth(job.heart, job.plane, job.view.plane, job.config).arrays}
+
+
+if __name__ == "__main__":
+    main("points", work, __doc__)
