@@ -7,7 +7,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 # Threads of BLAS that wait for a core that is taken spin: a decomposition of a matrix then costs twenty times its work.
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
@@ -15,18 +14,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 _CODE = "import json; from echotruth.workflow.instructions import environment; print(json.dumps(environment()))"
 os.environ.update(json.loads(subprocess.run([sys.executable, "-c", _CODE], check=True, stdout=subprocess.PIPE).stdout))
 
-from echotruth.workflow.processes import cache_name, lock_cache_writes  # noqa: E402 - it imports numpy
+from echotruth.workflow.processes import cache, guard_cache  # noqa: E402 - it imports numpy
 
-# The cache of jobs that run in the checkout.
-CACHE = Path(__file__).parents[1] / ".snakemake/numba" / cache_name()
-os.environ["NUMBA_CACHE_DIR"] = str(CACHE)
-
-
-def lend(caches):
-    """Let jobs that look for their caches in a folder find, and fill, that of the tests."""
-    CACHE.mkdir(parents=True, exist_ok=True)
-    caches.mkdir(parents=True)
-    (caches / cache_name()).symlink_to(CACHE)
-
-
-lock_cache_writes()
+os.environ["NUMBA_CACHE_DIR"] = str(cache())  # that of jobs, wherever they run
+guard_cache()
