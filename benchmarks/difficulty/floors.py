@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.difficulty.bound import AlignedImages
+from benchmarks.difficulty.plane import both_ways, plane_path, tissue_path
 from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.evaluation.agreement import REFERENCES
 from echotruth.evaluation.clip import Clip, between_frames, read_clips
-from echotruth.evaluation.difficulty.bound import AlignedImages
-from echotruth.evaluation.difficulty.plane import both_ways, plane_path, tissue_path
 from echotruth.evaluation.displacement_error import evaluate
-from echotruth.evaluation.scoring import Truth, ground_truth
+from echotruth.evaluation.points import Truth, ground_truth
 from echotruth.heart import Heart
 from echotruth.imaging import spline
 from echotruth.imaging.bmode import pixel_centres

@@ -1,9 +1,6 @@
 """A perfect tracker of the plane goes where formulas say; the bound is that of theory, and no estimator is below it."""
 
-import json
 from dataclasses import replace
-from pathlib import Path
-from shutil import copytree
 
 import numpy as np
 import pytest
@@ -11,11 +8,11 @@ from known_repository import FRAMES, SHIFT, SIZES
 from scipy import fft
 
 import echotruth as et
+from benchmarks.difficulty import floors
+from benchmarks.difficulty.bound import AlignedImages
+from benchmarks.difficulty.plane import plane_path, tissue_path
 from echotruth.config import Config
-from echotruth.evaluation.difficulty import floors, table
-from echotruth.evaluation.difficulty.bound import AlignedImages
-from echotruth.evaluation.difficulty.plane import plane_path, tissue_path
-from echotruth.evaluation.scoring import truth_at
+from echotruth.evaluation.points import truth_at
 from echotruth.imaging import spline
 from echotruth.imaging.view import imaging_plane
 from echotruth.tracking.alignment import interpolate_with_gradient
@@ -210,12 +207,6 @@ def test_images_without_anything_in_common_bound_nothing():
     assert np.isinf(alone.path_variance(1)[1]).all()
 
 
-@pytest.fixture(scope="module")
-def known(known, tmp_path_factory):
-    """A copy, in which the table of difficulties is kept."""
-    return replace(known, folder=Path(copytree(known.folder, tmp_path_factory.mktemp("difficulty") / "known")))
-
-
 def carried(known, fades):
     """`read_clips` with speckle that moves as the rigid body does; where it fades, every frame has its own."""
     original = floors.read_clips
@@ -273,44 +264,3 @@ def test_given_frames_are_followed_where_trackers_get_every_second_one(known, mo
     row = floors.difficulty(et.Repository(known.folder), known.case.id, "mid")[0]
     assert visits == [[0, 2], [0, 2]] and FRAMES == 3
     assert row["floor_plane_percent"] < 0.2 and np.hypot(*SHIFT[:2]) > 3e-4
-
-
-def test_table_of_a_repository_is_kept_until_its_images_change(known, monkeypatch):
-    asked = []
-
-    def found(_, case, view):
-        asked.append(view)
-        values = dict.fromkeys(floors.COLUMNS, 1.5) | {"floor_crb_percent": np.nan}
-        return [values | {"case": case, "view": view, "size_px": size} for size in SIZES]
-
-    monkeypatch.setattr(table, "difficulty", found)
-    first = table.difficulties(et.Repository(known.folder))
-    assert asked == ["mid", "long"] and list(first["size_px"]) == [*SIZES, *SIZES]
-    assert table.difficulties(et.Repository(known.folder)).equals(first) and asked == ["mid", "long"]
-    monkeypatch.setattr(et.Repository, "version", lambda *_: "of other images")
-    assert table.difficulties(et.Repository(known.folder), views=["long"])["view"].tolist() == ["long", "long"]
-    assert asked == ["mid", "long", "long"]
-    monkeypatch.undo()
-    kept = known.folder / "scratch" / known.case.id / "mid" / "difficulty.json"
-    kept.write_text(json.dumps({"key": []}))
-    again = et.Repository(known.folder).difficulty(known.case.id, "mid")
-    assert list(again["size_px"]) == list(SIZES) and (again["floor_plane_percent"] < 0.2).all()
-
-
-def test_table_is_made_again_for_the_points_of_another_grid(known, monkeypatch):
-    asked = []
-    monkeypatch.setattr(table, "difficulty", lambda _, *clip: asked.append(read.case().config.tracking.grid) or [])
-    read = et.Repository(known.folder)
-    finer = replace(known.case, config=et.configure(known.case.config, tracking={"grid": 0.025}))
-    for case in (known.case, known.case, finer):
-        monkeypatch.setattr(read, "case", lambda *_, case=case: case)
-        table._kept(read, case.id, "long")
-    assert asked[-2:] == [0.04, 0.025] and len(asked) == 2
-
-
-def test_unknown_case_or_view_is_named(known):
-    with pytest.raises(ValueError, match="view = 'apex': use one of mid, long"):
-        et.Repository(known.folder).difficulty(known.case.id, "apex")
-    for names in (["nobody"], "nobody"):
-        with pytest.raises(ValueError, match="case = 'nobody': use one of"):
-            table.difficulties(et.Repository(known.folder), cases=names)
