@@ -70,15 +70,15 @@ reference: .venv/ready  ## generated pages: schema and tables
 	$(BIN)/python docs/reference.py
 
 # Without scatterers and lines, which no reader needs, so that it is small.
-SAMPLE := src/echotruth/shipped/sample
+SAMPLE := src/echotruth/shipped/sample.zip
 sample: .venv/ready config/sample.yaml  ## the repository that comes with the package
 	rm -rf out/sample
 	$(BIN)/echotruth run config/sample.yaml
 	rm -rf out/sample/sample.zarr/clips/*/*/rf out/sample/sample.zarr/clips/*/*/phantom
 	$(BIN)/python workflow/scripts/repository.py out/sample
-	rm -rf $(SAMPLE) && mkdir -p $(SAMPLE)
-	cd out/sample && cp -r sample.zarr config.yaml cases.csv cases SHA256SUMS $(abspath $(SAMPLE))
-	$(BIN)/echotruth check $(SAMPLE)
+	$(BIN)/python -c 'import sys; from pathlib import Path; from echotruth.archive import pack; pack(*map(Path, sys.argv[1:3]), *sys.argv[3:])' \
+		$(SAMPLE) out/sample sample.zarr config.yaml cases.csv cases SHA256SUMS
+	$(BIN)/echotruth check sample
 
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
 	$(BIN)/echotruth validate

@@ -16,10 +16,11 @@ from echotruth.cases import expand
 from echotruth.config import shipped
 from echotruth.config.loading import load
 from echotruth.repository.check import check
+from echotruth.repository.code import PACKAGE
 from echotruth.repository.version import packages
 
 FOLDER = shipped.sample()
-BYTES = 7_000_000
+BYTES = 7_500_000
 
 
 def state() -> dict[Path, int]:
@@ -38,7 +39,29 @@ def untouched():
 def test_it_is_whole_and_finished():
     report = check(FOLDER)
     assert report.faults == [] and report.notes == []
-    assert report.groups == 2 * 6 + 2 * 2 * 3, "without scatterers and lines"
+    assert report.groups == 2 * 6 + 2 * 2 * 5, "without scatterers and lines"
+
+
+def test_it_is_in_the_users_cache_or_where_that_cannot_be_written_in_a_folder_that_does_not_stay(tmp_path):
+    code = "import echotruth as et; et.sample().scores; print(et.sample().folder, et.sample().is_sample)"
+
+    def folder(cache):
+        environment = os.environ | {"XDG_CACHE_HOME": str(cache)}
+        run = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        path, is_sample = run.stdout.split()
+        assert is_sample == "True"
+        return Path(path)
+
+    kept = folder(tmp_path / "cache")
+    assert kept == tmp_path / "cache/echotruth" / FOLDER.name and (kept / "cases.csv").is_file()
+    (tmp_path / "file").touch()
+    other = folder(tmp_path / "file")
+    assert tmp_path not in other.parents and not other.exists()
+
+
+def test_question_whether_a_folder_is_the_sample_unpacks_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(shipped, "sample", lambda: pytest.fail("it is unpacked"))
+    assert not shipped.is_sample(tmp_path / "out/demo")
 
 
 def test_it_is_that_of_the_shipped_configuration():
@@ -47,10 +70,9 @@ def test_it_is_that_of_the_shipped_configuration():
 
 
 def test_it_is_small_and_holds_nothing_of_the_run():
-    files = [path for path in FOLDER.rglob("*") if path.is_file()]
-    names = {path.relative_to(FOLDER).parts[0] for path in files}
+    names = {path.name for path in FOLDER.iterdir()}
     assert names == {"sample.zarr", "cases", "config.yaml", "cases.csv", "SHA256SUMS"}
-    assert sum(path.stat().st_size for path in files) < BYTES
+    assert (PACKAGE / "shipped/sample.zip").stat().st_size < BYTES
 
 
 def test_infarct_lowers_the_ejection_fraction_and_both_are_tracked():
@@ -107,11 +129,6 @@ def test_formats_of_rf_say_that_the_sample_has_none_and_what_makes_it(call, unto
     assert errors.count("\n") == 1
 
 
-def test_difficulty_is_not_kept_in_the_package(untouched, monkeypatch):
-    monkeypatch.setattr("echotruth.evaluation.difficulty.table.difficulty", lambda *_: [])
-    assert et.sample().difficulty("infarct", "mid").empty
-
-
 def test_it_opens_fast_as_nothing_is_imported_that_only_computing_and_tables_need(tmp_path, untouched):
     code = "import sys, echotruth as et; et.sample(); print({'numba', 'scipy', 'pandas', 'xarray'} & set(sys.modules))"
     found = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
@@ -130,8 +147,9 @@ from importlib import import_module
 from pathlib import Path
 from echotruth.workflow.job import Job, run
 
-for stage, size in {"phantom": None, "truth": None, "rf": None, "bmode": None, "tracking": 256}.items():
-    run(Job(Path(sys.argv[1]), stage, "infarct", "mid", size), import_module(f"workflow.scripts.{stage}").work)
+for job in "phantom", "truth", "points", "rf", "bmode", "tracking dis", "tracking bspline_dic":
+    stage, *tracker = job.split()
+    run(Job(Path(sys.argv[1]), stage, "infarct", "mid", *tracker), import_module(f"workflow.scripts.{stage}").work)
 """
 
 

@@ -4,12 +4,16 @@ travel in the wheel.
 
 import re
 import textwrap
+from contextlib import suppress
 from difflib import get_close_matches
+from functools import cache
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
 import yaml
+
+from echotruth import files
 
 _PLACES = (Path(__file__).parents[1] / "shipped", Path(__file__).parents[3])
 ROOT = next((place for place in _PLACES if (place / "Snakefile").is_file()), _PLACES[0])
@@ -46,9 +50,16 @@ def citation() -> dict[str, Any]:
     return dict(yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8")))
 
 
+@cache
 def sample() -> Path:
-    """Folder of the shipped repository."""
-    return _PLACES[0] / SAMPLE
+    """Folder of the shipped repository, which is unpacked into the user's cache, or else into a temporary folder."""
+    from echotruth.archive import unpacked
+
+    archive = _PLACES[0] / f"{SAMPLE}.zip"
+    if home := files.user_cache():
+        with suppress(OSError):
+            return unpacked(archive, home)
+    return unpacked(archive, files.temporary())
 
 
 def repository(path: str | Path) -> str | Path:
@@ -58,7 +69,8 @@ def repository(path: str | Path) -> str | Path:
 
 def is_sample(folder: Path) -> bool:
     """Whether a folder is that of the shipped repository, in which nothing is written."""
-    return folder.resolve() == sample().resolve()
+    folder = folder.resolve()
+    return folder.name.startswith(f"{SAMPLE}-") and folder == sample().resolve()  # do not unpack it for this question
 
 
 def meant(path: Path) -> str:
