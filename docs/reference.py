@@ -53,25 +53,28 @@ out/NAME/NAME.zarr/
     rf/                       lines; channels if rf.keep has them          rf
     truth/SIZE/               motion, strain and labels of every pixel     truth
     bmode/SIZE/               images                                       bmode
-    tracking/SIZE/            motion and scores of all trackers            tracking
+    points/                   true motion of the points that are tracked   points
+    tracking/TRACKER/         what a tracker finds, its scores, all sizes  tracking
   inference/CASE/           if inference.tracker names a tracker         inference
     posterior/ prior/ observed_data/ posterior_predictive/ constant_data/ fit/
 ```
 
-`HEART` and `CASE` are ids of `cases.csv`, `VIEW` a view and `SIZE` an image size of the configuration (512, 256,
-128 px). Cases that differ only in speckle, array or image have one heart. `xarray.open_datatree` opens all of it,
+`HEART` and `CASE` are ids of `cases.csv`; `VIEW`, `SIZE` (512, 256, 128 px) and `TRACKER` are those of the
+configuration. Cases that differ only in speckle, array or image have one heart. `xarray.open_datatree` opens all of it,
 and `xarray.open_zarr` a heart, a clip or a group; `echotruth.Repository` reads it by case, view and size.
 
 Files beside it, in `out/NAME`: `config.yaml`, `cases.csv` (the cases with status, heart, labels and all keys),
 `cases/CASE.json` (the configuration of each), `SHA256SUMS` (checksum of every file), `report.html` and `figures/`,
-`logs/` and `benchmarks/` (time and memory of every job), `drafts/` (what jobs are writing), and `external/` (scores
-of other trackers, NAME.csv, and what `echotruth evaluate --keep` stored of them, NAME.zarr, with the same groups).
+`logs/` and `benchmarks/` (time and memory of every job), `drafts/` (what jobs are writing), and `trackers.yaml`
+(settings of the trackers that `echotruth evaluate` added).
 
 - **Attributes of a group:** `status` (complete; failed: the heart has no solution; skipped: the heart is not
-  imaged), `reason` (why it is not complete; then it has no arrays), and `version`, a hash of the settings and the
-  code that it was made with. A heart has `bounded` (its measures that have bounds in the section `physiology`), and
-  tracking has `failures` (tracker -> why it failed). The root has title, summary, references, config (the whole
-  configuration), seed and packages (their versions).
+  imaged), `reason` (why it is not complete; then it has no arrays), `version`, a hash of the settings and the code
+  that it was made with, and `checksums`, the SHA-256 of its files. A heart has `bounded` (its measures that have
+  bounds in the section `physiology`), and a tracker `settings` and `failures` (image size -> why it failed). The root
+  has title, summary, references, config (the whole configuration), seed and packages (their versions).
+- **Consolidated metadata** of all that is below are in the root (of up to 50 000 groups and arrays), and in each heart
+  and clip.
 - **Coordinates** lie beside the arrays that have their dimensions.
 - **Chunks.** An array is one shard, and a chunk is one component of one frame (of what was tracked: of the whole
   cycle) with a crc32c checksum. Small arrays are one chunk. Numbers are compressed by Blosc (zstd, bytes shuffled).
@@ -95,6 +98,11 @@ and hertz); transmit, scan, apodization, transmit_apodization, harmonic and f_nu
 accuracy (largest error of the RF relative to the exact sum).
 """
 
+_SCORES = """The array `scores` of a tracker holds these numbers one after another, for each image size. The coordinate
+`score` labels them by name and place, as `nrmse 0 total`, and `score_units` has their units. `et.Repository.scores`
+and `.metrics()` read them as tables.
+"""
+
 _DERIVED = """What follows from the stored arrays is not stored. `echotruth.kinematics(heart)` gives the arrays
 below, for a heart that `echotruth.Repository.heart` reads or `echotruth.beat` makes. `echotruth.Repository.tracks`
 gives, at the points of the trackers, the strain of a tracked motion by the operator of `tracking.md`, and their layer
@@ -112,6 +120,8 @@ def schema_page() -> str:
     parts = [_SCHEMA_HEAD]
     for path, arrays in schema.KINDS.items():
         parts += [f"## {path}\n", *_arrays(arrays), *([_RF] if path == "rf" else [])]
+        if path == "tracking/TRACKER":
+            parts += ["### Scores\n", _SCORES, *_arrays(schema.SCORES.values())]
     parts += ["## Coordinates\n", *_arrays(schema.COORDINATES.values())]
     return "\n".join([*parts, "## Computed on reading\n", _DERIVED, *_arrays(schema.DERIVED)])
 
