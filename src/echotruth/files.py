@@ -21,6 +21,12 @@ def write(path: Path, content: bytes) -> None:
         draft.unlink(missing_ok=True)
 
 
+def remove_drafts(folder: Path) -> None:
+    """Remove what a process that was killed left of files that it was writing into a folder."""
+    for draft in folder.glob(".*.partial"):
+        draft.unlink(missing_ok=True)
+
+
 def update(path: Path, content: bytes) -> None:
     """Write a file if its content differs from that on disk, so that its date says when it changed."""
     if not path.is_file() or path.read_bytes() != content:

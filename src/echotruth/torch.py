@@ -1,7 +1,6 @@
 """The sequences of :mod:`echotruth.learning` as PyTorch data sets, whose items are dicts of tensors.
 
 >>> from echotruth import learning
-from echotruth.extras import installation
 >>> from echotruth.torch import FlowPairs, loader
 >>> parts = learning.split(learning.cases("sample"), {"train": 0.7, "test": 0.3}, seed=3)
 >>> batch = next(iter(loader(FlowPairs("sample", parts["train"]), 8)))

@@ -136,10 +136,18 @@ def test_plan_alone_writes_nothing(tmp_path):
         assert not plan.is_published and not list(tmp_path.iterdir())
 
 
-def test_what_a_killed_run_left_is_removed(done):
-    (done / "drafts/abc").mkdir(parents=True)
-    begin(done, configured(views=("mid",), cases={}))
-    assert not (done / "drafts").exists()
+def test_what_a_killed_run_left_is_removed(done, tmp_path):
+    folder, config = shutil.copytree(done, tmp_path / "small"), configured(views=("mid",), cases={})
+    before = content(folder)
+    (folder / "drafts/abc").mkdir(parents=True)
+    left = [
+        folder / name / ".zarr.json.12345678.partial" for name in ("", "cases", "small.zarr", "small.zarr/clips/heart")
+    ]
+    for path in left:
+        path.write_text("{")
+    (folder / "SHA256SUMS").unlink()  # as where a run begins that has work to do
+    assert remake(folder, config) == ["repository"]
+    assert content(folder) == before and not (folder / "drafts").exists() and not any(path.exists() for path in left)
 
 
 def test_files_of_the_cases_are_written_only_if_they_change(done):

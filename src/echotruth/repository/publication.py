@@ -115,6 +115,7 @@ def write_holders(store: Path, config: Config, cases: list[Case]) -> None:
             if path.parent.relative_to(store).as_posix() not in wanted:
                 path.unlink()
     for name, attributes in wanted.items():
+        files.remove_drafts(store / name)
         files.update(store / name / METADATA, metadata.content(attributes))
 
 

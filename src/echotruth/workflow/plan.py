@@ -243,6 +243,8 @@ class Plan:
         """Remove what only a run needs."""
         for name in ("drafts", "touched"):
             shutil.rmtree(self.folder / name, ignore_errors=True)
+        for folder in (self.folder, self.folder / "cases"):
+            files.remove_drafts(folder)
 
     def _texts(self) -> dict[Path, bytes]:
         """Configuration and table of the cases, as they are to be."""
