@@ -29,9 +29,10 @@ def merge(arguments: argparse.Namespace) -> int:
     """
     from echotruth.cli.configuration import load_cases
     from echotruth.config import shipped
+    from echotruth.repository.group import ChecksumError
     from echotruth.repository.places import repository_folder
     from echotruth.workflow.lock import LockError, is_held
-    from echotruth.workflow.merging import Damaged, merge
+    from echotruth.workflow.merging import merge
     from echotruth.workflow.plan import Plan
 
     config, _ = load_cases(arguments.config)
@@ -42,7 +43,7 @@ def merge(arguments: argparse.Namespace) -> int:
             return fail(f"{busy[0]}: a run works on it: wait for it")
         plan.begin()
         copied = merge(plan, sources)
-    except (FileNotFoundError, LockError, Damaged) as error:
+    except (FileNotFoundError, LockError, ChecksumError) as error:
         return fail(str(error))
     print(f"{plan.folder}: {copied} hearts and clips are copied: echotruth run {arguments.config} makes the rest")
     return 0

@@ -1,6 +1,5 @@
 """Check of a repository: its files against their checksums, every chunk of its arrays, and the values in them."""
 
-import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +9,7 @@ from typing import NamedTuple
 
 from echotruth.config import Config
 from echotruth.repository import group, values
-from echotruth.repository.checksums import CHECKSUMS, METADATA, checksum, files_of, sealed
+from echotruth.repository.checksums import CHECKSUMS, METADATA, checksum, files_of, read_sealed
 from echotruth.repository.group import NotWritten
 from echotruth.repository.places import group_of, job_of, made
 from echotruth.repository.publication import TEXTS, published_checksums
@@ -125,8 +124,8 @@ def _hashes(folder: Path, names: Iterable[str]) -> dict[str, str]:
 def _stored(folder: Path, group: str) -> dict[str, str]:
     """Checksums that the job of a group stored in it, by path below the folder; none if they are damaged."""
     try:
-        found = sealed(json.loads((folder / group / METADATA).read_bytes()))
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        _, found = read_sealed(folder / group)
+    except (FileNotFoundError, ValueError):
         return {}
     return {f"{group}/{name}": hash for name, hash in found.items()}
 

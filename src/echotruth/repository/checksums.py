@@ -73,6 +73,25 @@ def sealed(document: dict[str, Any]) -> dict[str, str]:
     return found
 
 
+def read_sealed(folder: Path) -> tuple[dict[str, Any], dict[str, str]]:
+    """Content of the `zarr.json` of a group, and the checksums of its files as :func:`sealed` returns them.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no group.
+    ValueError
+        If the content is not what the job wrote, or cannot be read.
+    """
+    try:
+        document = json.loads((folder / METADATA).read_bytes())
+        return document, sealed(document)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise ValueError("its metadata are not what was written") from None
+
+
 def _own(document: dict[str, Any], below: dict[str, str]) -> str:
     """Hash of the content of a `zarr.json` whose checksums are those of the other files."""
     attributes = document["attributes"] | {ATTRIBUTE: lines_of(below)}

@@ -5,18 +5,16 @@ from pathlib import Path
 from typing import Any
 
 from echotruth import files
-from echotruth.repository.checksums import METADATA, files_of, sealed
+from echotruth.repository.checksums import METADATA, files_of, read_sealed
 
 
 def attributes(folder: Path) -> dict[str, Any]:
     """Attributes of a group on disk; none if there is no group, or its metadata are not what was written."""
     try:
-        document = json.loads((folder / METADATA).read_bytes())
-        sealed(document)
-        found = document["attributes"]
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        document, _ = read_sealed(folder)
+    except (FileNotFoundError, ValueError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return dict(document["attributes"])
 
 
 def content(attributes: dict[str, Any], below: dict[str, dict[str, Any]] | None = None) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection
 from hashlib import sha256
 from itertools import groupby
 from pathlib import Path
@@ -72,17 +72,15 @@ def as_csv(summary: pd.DataFrame) -> bytes:
     return summary.to_csv(index=False).encode()
 
 
-def asked_for(cases: list[Case]) -> Iterator[str]:
+def asked_for(cases: list[Case]) -> list[str]:
     """Paths of all groups of jobs that the cases ask for, those of a heart once."""
-    hearts = set()
-    for case in cases:
-        for job in jobs_of(case.id, case.config):
-            for group in groups_of(job.stage, case.config.bmode.sizes, job.tracker):
-                path = place(group, case.heart, case.id, job.view)
-                if path not in hearts:
-                    yield path
-                if job.stage == "mechanics":
-                    hearts.add(path)
+    paths = (
+        place(group, case.heart, case.id, job.view)
+        for case in cases
+        for job in jobs_of(case.id, case.config)
+        for group in groups_of(job.stage, case.config.bmode.sizes, job.tracker)
+    )
+    return list(dict.fromkeys(paths))
 
 
 def holders(config: Config, cases: list[Case]) -> dict[str, dict[str, Any]]:
@@ -110,13 +108,19 @@ def write_holders(store: Path, config: Config, cases: list[Case]) -> None:
     Those of cases and views that are no more are removed: what they held is no part of the repository.
     """
     wanted = holders(config, cases)
+    _remove_others(store, wanted)
+    for name, attributes in wanted.items():
+        files.update(store / name / METADATA, metadata.content(attributes))
+
+
+def _remove_others(store: Path, wanted: Collection[str]) -> None:
+    """Remove holders that are not wanted, and what a killed run left in those that are."""
     for pattern in ("inference", "clips/*", "clips/*/*", *(f"clips/*/*/{stage}" for stage in NESTED)):
         for path in store.glob(f"{pattern}/{METADATA}"):
             if path.parent.relative_to(store).as_posix() not in wanted:
                 path.unlink()
-    for name, attributes in wanted.items():
+    for name in wanted:
         files.remove_drafts(store / name)
-        files.update(store / name / METADATA, metadata.content(attributes))
 
 
 def _publish_groups(store: Path, config: Config, cases: list[Case]) -> dict[str, str]:
@@ -127,8 +131,9 @@ def _publish_groups(store: Path, config: Config, cases: list[Case]) -> dict[str,
     dict of str
         Checksums of all files by their paths below the store.
     """
-    write_holders(store, config, cases)
     held = holders(config, cases)
+    _remove_others(store, held)
+    contents = {path: metadata.content(attributes) for path, attributes in held.items()}
     hashes: dict[str, str] = {}
     tree: dict[str, Any] | None = {path: _document(attributes) for path, attributes in held.items() if path}
     groups = [path for path in asked_for(cases) if (store / path / METADATA).is_file()]
@@ -141,9 +146,12 @@ def _publish_groups(store: Path, config: Config, cases: list[Case]) -> dict[str,
             inside = found | {f"{clip}/{stage}": _document({}) for stage in NESTED}
             below = {path.removeprefix(f"{clip}/"): document for path, document in inside.items()}
             files.update(store / clip / METADATA, metadata.content(held[clip], below))
+            del contents[clip]
         if tree is not None:
             tree = tree | found if len(tree) + len(found) <= LARGEST_TREE else None
-    files.update(store / METADATA, metadata.content(held[""], tree))
+    contents[""] = metadata.content(held[""], tree)
+    for path, content in contents.items():
+        files.update(store / path / METADATA, content)
     return hashes | {f"{path}/{METADATA}".lstrip("/"): checksum(store / path / METADATA) for path in held}
 
 

@@ -7,11 +7,8 @@ from pathlib import Path
 from echotruth import files
 from echotruth.repository.check import check
 from echotruth.repository.checksums import CHECKSUMS, METADATA
+from echotruth.repository.group import ChecksumError
 from echotruth.workflow.plan import Plan
-
-
-class Damaged(ValueError):
-    """Raised if a repository is not as it was written, so that nothing is taken from it."""
 
 
 def merge(plan: Plan, sources: Sequence[Path]) -> int:
@@ -31,12 +28,14 @@ def merge(plan: Plan, sources: Sequence[Path]) -> int:
 
     Raises
     ------
-    Damaged
+    ChecksumError
         If a file of a repository is not what was written.
     """
     for folder in sources:
         if faults := check(folder, quick=True).faults:
-            raise Damaged(f"{folder} is damaged, so that nothing is copied: {faults[0]} (echotruth check {folder})")
+            raise ChecksumError(
+                f"{folder} is damaged, so that nothing is copied: {faults[0]} (echotruth check {folder})"
+            )
     clips = [f"clips/{case}/{view}" for case in plan.cases for view in plan.config.views]
     places = [*(f"hearts/{heart}" for heart in plan.hearts), *clips, *(f"inference/{case}" for case in plan.cases)]
     copied = 0
