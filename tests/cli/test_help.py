@@ -1,7 +1,6 @@
-"""Help, completion, and what is said of mistyped commands and options."""
+"""Help, and what is said of mistyped commands and options."""
 
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -66,37 +65,11 @@ def test_command_alone_prints_what_there_is(call):
         (["export", "out/demo", "--format", "mp4", "--rate", "fast"], "argument --rate: invalid float value: 'fast'"),
         (["evaluate", "out/demo", "--tracker", "dis", "--jobs", "5.1"], "argument --jobs: invalid int value: '5.1'"),
         (["check"], "the following arguments are required"),
-        (["completion", "bsh"], "shell = bsh: did you mean bash?"),
     ],
 )
 def test_mistyped_command_is_refused_in_one_line(call, arguments, sentence):
     status, output, errors = call(*arguments)
     assert (status, output, errors.count("\n")) == (2, "", 1) and sentence in errors, errors
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["exp"], {"export"}),
-        (["export", "--ov"], {"--overlay"}),
-        (["export", "--format", "m"], {"mp4", "matlab"}),
-        (["check", "mi"], {"mine.yaml"}),
-    ],
-)
-def test_bash_completes_commands_options_choices_and_files(call, tmp_path, words, expected):
-    script = call("completion", "bash")[1]
-    (tmp_path / "mine.yaml").write_text("seed: 1")
-    line = " ".join(words)
-    asked = f"COMP_WORDS=(echotruth {line}); COMP_CWORD={len(words)}; COMP_LINE='echotruth {line}'; _shtab_echotruth\n"
-    whole = script + "\n" + asked + 'printf "%s\\n" "${COMPREPLY[@]}"\n'
-    done = subprocess.run(["bash", "-c", whole], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert set(done.stdout.split()) == expected, done.stderr
-
-
-def test_zsh_gets_a_script_too(call):
-    status, output, _ = call("completion", "zsh")
-    assert status == 0 and output.startswith("#compdef echotruth") and all(name in output for name in NAMES)
 
 
 def test_reader_who_has_seen_enough_ends_the_command_without_a_word():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from echotruth.cli.command import add_repeated, fail
 
-EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "matlab", "csv", "tap", "flo", "uff", "zea")
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "csv", "tap", "uff", "zea")
 """Formats of `echotruth export`."""
 
 
@@ -19,7 +19,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("case", str, "case id from cases.csv; can be repeated (default: all)"),
         ("view", str, "name of the view; can be repeated (default: all)"),
         ("size", int, "image size, px; can be repeated (default: the largest)"),
-        ("tracker", str, "tracker for matlab and csv; can be repeated (default: all)"),
+        ("tracker", str, "tracker for csv; can be repeated (default: all)"),
         (
             "overlay",
             str,

@@ -1,6 +1,5 @@
-"""Point tracks as TAP-Vid has them, and flow as OpenCV reads it, of a heart that is shifted by known steps."""
+"""Point tracks as TAP-Vid has them, of a heart that is shifted by known steps."""
 
-import cv2
 import numpy as np
 import pytest
 from known_repository import FRAMES, SHIFT, SIZES
@@ -47,24 +46,3 @@ def test_point_is_occluded_where_it_is_beside_the_slice(tap, known):
     sure = np.abs(np.abs(tap["elevation_m"]) - half) > 1e-6
     np.testing.assert_array_equal(tap["occluded"][sure], beside[sure])
     assert not tap["occluded"][:, 0].any()
-
-
-@pytest.mark.parametrize("view", ["mid", "long"])
-def test_flow_is_read_by_opencv_in_pixels(exported, known, view):
-    folder, truth = exported("flo", view), known.labels(view, SIZES[0])
-    files = sorted(file.name for file in folder.iterdir())
-    assert files == ["backward_001.flo", "backward_002.flo", "forward_000.flo", "forward_001.flo"]
-    step = STEP @ np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]]) @ known.plane(view).axes.T / known.spacing
-    for name in files:
-        flow = cv2.readOpticalFlow(str(folder / name))
-        wall = truth["mask"][int(name[-7:-4])]
-        assert flow.shape == (SIZES[0], SIZES[0], 2)
-        sign = 1 if name.startswith("forward") else -1
-        np.testing.assert_allclose(flow[wall], np.broadcast_to(sign * step[:2], (wall.sum(), 2)), atol=0.01)
-        assert (flow[~wall] > 1e9).all() and wall.any()
-
-
-def test_larger_pixels_make_smaller_flow(exported):
-    large, small = (cv2.readOpticalFlow(str(exported("flo", size=size) / "forward_000.flo")) for size in SIZES)
-    known = [flow[flow[..., 0] < 1e9].mean(axis=0) for flow in (large, small)]
-    np.testing.assert_allclose(known[0], 2 * known[1], atol=0.01)

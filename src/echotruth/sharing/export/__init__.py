@@ -71,10 +71,8 @@ FORMATS = {
     "nifti": Format("nifti", ".nii.gz"),
     "dicom": Format("dicom", ".dcm"),
     "vtk": Format("vtk", "", (), "heart"),
-    "matlab": Format("matlab", ".mat", ("truth", "bmode", "points"), options=("trackers",)),
     "csv": Format("curves", ".csv", ("points",), options=("trackers",), table="summary.csv"),
     "tap": Format("tap", ".npz"),
-    "flo": Format("flo", ""),
     "uff": Format("uff", ".uff", ("rf",), "view"),
     "zea": Format("zea", ".hdf5", ("rf",), "view"),
 }
