@@ -81,7 +81,7 @@ sample: .venv/ready config/sample.yaml  ## the repository that comes with the pa
 	$(BIN)/echotruth check sample
 
 validation: .venv/ready  ## docs/validation.md; takes half an hour on one core
-	$(BIN)/echotruth validate
+	$(BIN)/python -m validation
 
 COMPILE := uv pip compile pyproject.toml --extra make --extra test --extra browser --extra build --universal --python-version 3.11 \
 	--generate-hashes --no-header --no-annotate --quiet

@@ -16,7 +16,7 @@ CHECKS = (patch, inflation, beam, ventricle, refinement, work, indifference)
 
 _HEAD = """# What was checked, against what
 
-Numbers of `echotruth validate` (`make validation`), which writes this page. "Allowed" is the largest difference from
+Numbers of `python -m validation` (`make validation`), which writes this page. "Allowed" is the largest difference from
 what was expected, where a number is judged; one beyond it says **missed**. Beside these, `tests/` checks each stage
 by itself, and [tracking.md](tracking.md) tells how the paper's tracker fares.
 

@@ -141,7 +141,7 @@ def test_absurd_is_refused_and_run_if_it_is_asked_for_and_an_estimate_runs_nothi
 def test_help_names_every_command():
     status, output, _ = run_cli("--help")
     assert status == 0
-    assert all(command in output for command in ("check", "cases", "run", "merge", "validate", "export", "evaluate"))
+    assert all(command in output for command in ("check", "cases", "run", "merge", "export", "evaluate"))
 
 
 def test_version():

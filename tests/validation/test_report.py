@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from echotruth.cli import main
 from validation import page
+from validation.__main__ import main
 from validation.report import Report, Row
 
 
@@ -52,7 +52,7 @@ def test_page_holds_every_check_and_says_whether_all_is_met(tmp_path, monkeypatc
 @pytest.mark.parametrize("found", [0, 1])
 def test_command_writes_the_page_and_fails_where_a_number_is_off(tmp_path, monkeypatch, capsys, found):
     monkeypatch.setattr(page, "CHECKS", (sums(found),))
-    monkeypatch.setattr("sys.argv", ["echotruth", "validate", "--folder", str(tmp_path)])
+    monkeypatch.setattr("sys.argv", ["validation", "--folder", str(tmp_path)])
     with pytest.raises(SystemExit) as left:
         main()
     assert left.value.code == found

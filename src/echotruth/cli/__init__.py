@@ -10,7 +10,7 @@ from echotruth.extras import MissingPackage, explained
 
 COMMANDS = (
     *("new", "check", "cases", "run", "status", "info", "show"),
-    *("draw", "track", "evaluate", "infer", "export", "describe", "release", "merge", "validate"),
+    *("draw", "track", "evaluate", "infer", "export", "describe", "release", "merge"),
 )
 """Commands, and their modules and functions, in the order of `echotruth --help`."""
 
