@@ -66,7 +66,7 @@ def examples(repository, cases):
 
 def diagnoses(repository, cases):
     """Clips of one view with the diagnosis of each heart."""
-    return learning.Diagnosis(repository, cases, [VIEW])
+    return learning.Clips(repository, cases, [VIEW], heart=["diagnosis", "es_frame"])
 
 
 def train(unrolled, infarct, steps, seed=0):

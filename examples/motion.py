@@ -16,7 +16,7 @@ import torch
 from torch import nn
 
 from echotruth import learning
-from echotruth.torch import FlowPairs, loader
+from echotruth.torch import loader
 from echotruth.tracking import TrackerFailed
 from echotruth.tracking.tracker import track
 
@@ -148,7 +148,7 @@ def scores(network, pairs):
 
 def compare(repository, train_on, test_on, epochs=15):
     """Train on some cases, and score on others."""
-    return scores(train(FlowPairs(repository, train_on), epochs), learning.FlowPairs(repository, test_on))
+    return scores(train(learning.FlowPairs(repository, train_on), epochs), learning.FlowPairs(repository, test_on))
 
 
 def main(repository):

@@ -17,7 +17,7 @@ from scipy.ndimage import label as components
 from torch import nn
 
 from echotruth import learning
-from echotruth.torch import Segmentation, loader
+from echotruth.torch import loader
 
 FRACTIONS = {"train": 0.7, "test": 0.3}
 
@@ -110,8 +110,8 @@ def scores(network, known, new):
 
 def compare(repository, train_on, test_on, epochs=8):
     """Train on some cases, and score on others."""
-    network = train(Segmentation(repository, train_on), epochs)
-    return scores(network, *(learning.Segmentation(repository, part) for part in (train_on, test_on)))
+    known, held_out = (learning.Segmentation(repository, part) for part in (train_on, test_on))
+    return scores(train(known, epochs), known, held_out)
 
 
 def main(repository):

@@ -1,9 +1,9 @@
 """The sequences of :mod:`echotruth.learning` as PyTorch data sets, whose items are dicts of tensors.
 
 >>> from echotruth import learning
->>> from echotruth.torch import FlowPairs, loader
+>>> from echotruth.torch import loader
 >>> parts = learning.split(learning.cases("sample"), {"train": 0.7, "test": 0.3}, seed=3)
->>> batch = next(iter(loader(FlowPairs("sample", parts["train"]), 8)))
+>>> batch = next(iter(loader(learning.FlowPairs("sample", parts["train"]), 8)))
 >>> batch["image"].shape, batch["flow"].shape
 (torch.Size([8, 2, 256, 256]), torch.Size([8, 2, 256, 256]))
 """
@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from echotruth import learning
 from echotruth.extras import installation
 from echotruth.learning import Item, Items
 
@@ -24,7 +23,7 @@ except ModuleNotFoundError as error:
         raise
     raise ModuleNotFoundError(f"echotruth.torch needs PyTorch: {installation('torch')}", name="torch") from None
 
-__all__ = ["Clips", "Diagnosis", "FlowPairs", "PointTracks", "Segmentation", "Strain", "Tensors", "loader", "tensors"]
+__all__ = ["Tensors", "loader", "tensors"]
 
 
 def tensors(item: Item) -> Item:
@@ -48,36 +47,6 @@ class Tensors(Dataset[Item]):
 
     def __getitem__(self, index: int) -> Item:
         return tensors(self.items[index])
-
-
-def Clips(*arguments: Any, **options: Any) -> Tensors:
-    """:class:`echotruth.learning.Clips` as tensors; it takes the same parameters."""
-    return Tensors(learning.Clips(*arguments, **options))
-
-
-def FlowPairs(*arguments: Any, **options: Any) -> Tensors:
-    """:class:`echotruth.learning.FlowPairs` as tensors; it takes the same parameters."""
-    return Tensors(learning.FlowPairs(*arguments, **options))
-
-
-def PointTracks(*arguments: Any, **options: Any) -> Tensors:
-    """:class:`echotruth.learning.PointTracks` as tensors; it takes the same parameters."""
-    return Tensors(learning.PointTracks(*arguments, **options))
-
-
-def Segmentation(*arguments: Any, **options: Any) -> Tensors:
-    """:class:`echotruth.learning.Segmentation` as tensors; it takes the same parameters."""
-    return Tensors(learning.Segmentation(*arguments, **options))
-
-
-def Strain(*arguments: Any, **options: Any) -> Tensors:
-    """:class:`echotruth.learning.Strain` as tensors; it takes the same parameters."""
-    return Tensors(learning.Strain(*arguments, **options))
-
-
-def Diagnosis(*arguments: Any, **options: Any) -> Tensors:
-    """:class:`echotruth.learning.Diagnosis` as tensors; it takes the same parameters."""
-    return Tensors(learning.Diagnosis(*arguments, **options))
 
 
 def loader(

@@ -19,12 +19,10 @@ from echotruth.mechanics.prescribed import motion_amplitude
 
 FRAMES, SIZE = 3, 64
 KINDS = {
-    "Clips": {"truth": ["displacement", "labels", "flow"]},
+    "Clips": {"truth": ["displacement", "labels", "flow"], "heart": learning.clips.HEART},
     "FlowPairs": {},
     "PointTracks": {"start": None, "points": 20},
     "Segmentation": {"target": "segment"},
-    "Strain": {},
-    "Diagnosis": {},
 }
 
 
@@ -158,15 +156,14 @@ def test_labels_are_those_of_the_notebook(repository, target):
 
 
 def test_strain_and_diagnosis_are_those_of_the_heart(repository):
-    hearts, part = et.Repository(repository), {"views": ["mid"], "size": 32}
-    for strain, diagnosis in zip(
-        learning.Strain(repository, **part), learning.Diagnosis(repository, **part), strict=True
-    ):
-        heart, mean = hearts.heart(strain["case"]), hearts.read("kinematics/strain_mean", strain["case"])
-        np.testing.assert_allclose(strain["strain"], mean, atol=1e-7)
-        assert strain["es_frame"] == heart.es
-        assert diagnosis["label"] == (heart.region == 1).any() == (diagnosis["scar_size"] > 0)
-        assert diagnosis["diagnosis"] == ("infarct" if diagnosis["label"] else "healthy")
+    hearts, table = et.Repository(repository), learning.cases(repository)
+    for item in learning.Clips(repository, views=["mid"], size=32, heart=learning.clips.HEART):
+        heart, mean = hearts.heart(item["case"]), hearts.read("kinematics/strain_mean", item["case"])
+        np.testing.assert_allclose(item["strain_mean"], mean, atol=1e-7)
+        assert item["es_frame"] == heart.es
+        assert item["label"] == (heart.region == 1).any() == (item["scar_size"] > 0)
+        assert item["diagnosis"] == ("infarct" if item["label"] else "healthy")
+        assert item["gls"] == pytest.approx(table.loc[item["case"], "gls"], nan_ok=True)
 
 
 @pytest.mark.slow
@@ -205,7 +202,7 @@ def test_copy_for_a_worker_has_no_open_array(repository):
 def test_sequences_are_as_long_as_their_cases_views_and_frames(repository):
     part = learning.cases(repository, "diagnosis == 'infarct' and seed == 1")
     lengths = {kind: len(sequence(repository, kind, cases=part, views=["mid"])) for kind in KINDS}
-    assert lengths == {"Clips": 1, "FlowPairs": 2, "PointTracks": 1, "Segmentation": 3, "Strain": 1, "Diagnosis": 1}
+    assert lengths == {"Clips": 1, "FlowPairs": 2, "PointTracks": 1, "Segmentation": 3}
     assert len(learning.FlowPairs(repository)) == 4 * 2 * 2
     with pytest.raises(IndexError):
         learning.Clips(repository)[8]
@@ -217,11 +214,12 @@ def test_sequences_are_as_long_as_their_cases_views_and_frames(repository):
         (lambda folder: learning.Clips(folder, ["nobody"]), "case = 'nobody': use one of"),
         (lambda folder: learning.Clips(folder, views=["front"]), "view = 'front': use one of mid, long_axis"),
         (lambda folder: learning.Clips(folder, size=100), "size = 100: use one of 64, 32"),
-        (lambda folder: learning.Clips(folder, truth=["speed"]), "truth = 'speed': use any of displacement"),
+        (lambda folder: learning.Clips(folder, truth=["speed"]), "truth = 'speed': use one of displacement"),
         (lambda folder: learning.Segmentation(folder, target="cavity"), "target = 'cavity': use one of wall"),
         (lambda folder: learning.PointTracks(folder, points=0), "points = 0"),
         (lambda folder: learning.PointTracks(folder, start=3), "start = 3: give a frame from 0 to 2"),
-        (lambda folder: learning.Diagnosis(folder, classes=["healthy"]), "is infarct: add it"),
+        (lambda folder: learning.Clips(folder, heart="weight"), "heart = 'weight': use one of diagnosis"),
+        (lambda folder: learning.Clips(folder, heart="diagnosis", classes=["healthy"]), "is infarct: add it"),
         (lambda folder: learning.Clips(folder.parent), "is not a repository"),
         (lambda folder: learning.cases(folder, "depth > 3"), "query = 'depth > 3'"),
         (lambda folder: learning.cases(folder, "status =="), "query = 'status =='"),
