@@ -13,40 +13,53 @@ import psutil
 import pytest
 from cli.command_line import run_cli
 
-from echotruth.cli.snakemake import FOLDER, cores, executor_error, option_errors, split_targets, with_profiles
+from echotruth.cli import parser
+from echotruth.cli.snakemake import FOLDER, given, jobs_at_once, problem, split_targets
 from echotruth.workflow.progress import Progress
 from echotruth.workflow.run import execute, snakemake_command
 
 PACKAGED = ["--workflow-profile", str(FOLDER / "slurm")]
 
 
-@pytest.mark.parametrize("options", [["--profile", "slurm"], ["--profile=slurm"], ["--workflow-profile", "slurm"]])
+def parsed(*options):
+    """Arguments of a run, as the command line gives them."""
+    arguments, arguments.options = parser().parse_known_args(["run", "tiny.yaml", *options])
+    return arguments
+
+
+def refused(capsys, *options):
+    """What is said of options that the command does not take."""
+    with pytest.raises(SystemExit) as left:
+        parsed(*options)
+    assert left.value.code == 2
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize("options", [["--profile", "slurm"], ["--profile=slurm"]])
 def test_profile_of_the_package_is_found_by_its_name(tmp_path, options):
     with chdir(tmp_path):
-        assert with_profiles(["--cores", "2", *options, "-p"]) == ["--cores", "2", *PACKAGED, "-p"]
+        assert given(parsed("--cores", "2", *options, "-p")) == (["--cores", "2", *PACKAGED, "-p"], [])
 
 
-@pytest.mark.parametrize("options", [["slurm"], ["--config", "slurm"], ["--profile", "mine"], ["--profile"], ["-n"]])
+@pytest.mark.parametrize(
+    "options", [["--jobs", "5", "--retries", "2"], ["--profile", "none"], ["--dry-run", "-k"], ["--batch", "all=1/2"]]
+)
 def test_other_options_stay_as_they_are(tmp_path, options):
     with chdir(tmp_path):
-        assert with_profiles(options) == options
+        assert given(parsed(*options)) == (options, [])
 
 
-def test_folder_of_the_user_is_preferred_to_a_profile_of_its_name(tmp_path):
-    (tmp_path / "slurm").mkdir()
+def test_folder_of_the_user_is_preferred_to_a_profile_of_its_name_and_can_stand_beside_one(tmp_path):
     with chdir(tmp_path):
-        assert with_profiles(["--profile", "slurm"]) == ["--profile", "slurm"]
+        Path("mine").mkdir()
+        assert given(parsed("--profile", "slurm", "--profile", "mine"))[0] == [*PACKAGED, "--profile", "mine"]
+        Path("slurm").mkdir()
+        assert given(parsed("--profile", "slurm"))[0] == ["--profile", "slurm"]
 
 
 @pytest.mark.parametrize("options", [["--cores", "0"], ["--cores=0"], ["-j", "0"], ["-c", "-1"], ["--cores", "two"]])
-def test_number_of_cores_with_which_nothing_would_ever_run_is_refused(options):
-    (error,) = option_errors(options)
-    assert error.startswith(options[0].split("=")[0]) and "give a whole number above 0" in error
-
-
-@pytest.mark.parametrize("options", [["--cores", "2"], ["-c", "all"], ["--jobs=unlimited"], ["-j"], ["--cores", "-n"]])
-def test_numbers_of_cores_that_snakemake_takes_are_no_errors(options):
-    assert option_errors(options) == []
+def test_number_of_cores_with_which_nothing_would_ever_run_is_refused(capsys, options):
+    assert "is not a whole number above 0" in refused(capsys, *options)
 
 
 @pytest.mark.parametrize(
@@ -55,15 +68,16 @@ def test_numbers_of_cores_that_snakemake_takes_are_no_errors(options):
 )
 def test_cores_are_those_that_the_options_or_the_profile_give(tmp_path, options, expected):
     with chdir(tmp_path):
-        assert cores(options) == expected
+        assert jobs_at_once(parsed(*options)) == expected
+        assert jobs_at_once(parsed("--cores", "all")) == len(os.sched_getaffinity(0))
 
 
 @pytest.mark.parametrize("option", ["--config", "-C", "--configfile"])
 def test_configuration_is_not_changed_behind_its_file(option):
-    assert option_errors([option, "seed=3"]) == [f"{option}: change the file of the configuration"]
+    assert problem(parsed(option, "seed=3")) == f"{option}: change the file of the configuration"
 
 
-def test_configuration_or_misspelt_name_is_not_taken_for_a_profile(tmp_path, monkeypatch):
+def test_configuration_or_misspelt_name_is_not_taken_for_a_profile(tmp_path, monkeypatch, capsys):
     (tmp_path / "mine").mkdir()
     (tmp_path / "config.yaml").write_text("jobs: 2\n")
     (tmp_path / "tiny.yaml").write_text("name: tiny\n")
@@ -71,16 +85,14 @@ def test_configuration_or_misspelt_name_is_not_taken_for_a_profile(tmp_path, mon
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
     with chdir(tmp_path):
         known = "mine", "slurm", "none", "config.yaml", "cluster"
-        assert all(option_errors(["--profile", name]) == [] for name in known)
-        (swapped,) = option_errors(["--profile", "tiny.yaml"])
-        (misspelt,) = option_errors(["--profile", "slrm"])
+        assert [problem(parsed("--profile", name)) for name in known if name != "slurm"] == [""] * 4
+        swapped, misspelt = (refused(capsys, "--profile", name) for name in ("tiny.yaml", "slrm"))
     remedy = "(did you mean slurm?): give default or slurm, or a folder that holds a config.yaml"
-    assert misspelt == f"--profile slrm: is not a profile {remedy}"
-    assert swapped.startswith("--profile tiny.yaml: is not a profile: give") and "slurm" in swapped
-    assert swapped.endswith("the file of the configuration comes before the options")
+    assert f"slrm is not a profile {remedy}" in misspelt
+    assert "tiny.yaml is not a profile: give" in swapped and "slurm" in swapped
 
 
-@pytest.mark.parametrize(("given", "options", "targets"), [
+@pytest.mark.parametrize(("said", "options", "targets"), [
     ("--cores 2 repository", "--cores 2", "repository"),
     ("repository -n", "-n", "repository"),
     ("--rerun-triggers mtime report -p", "--rerun-triggers mtime -p", "report"),
@@ -89,8 +101,8 @@ def test_configuration_or_misspelt_name_is_not_taken_for_a_profile(tmp_path, mon
     ("out/tiny/tiny.zarr/hearts/heart/zarr.json -k", "-k", "out/tiny/tiny.zarr/hearts/heart/zarr.json"),
     ("-R rf -- a b", "-R rf", "a b"),
 ])  # fmt: skip
-def test_what_is_to_be_made_is_told_from_options(given, options, targets):
-    assert split_targets(given.split()) == (options.split(), targets.split())
+def test_what_is_to_be_made_is_told_from_options(said, options, targets):
+    assert split_targets(said.split()) == (options.split(), targets.split())
 
 
 @pytest.mark.parametrize(("executor", "remedy"), [("slurm", "[slurm]'"), ("lsf", "executor-plugin-lsf")])
@@ -99,9 +111,9 @@ def test_missing_package_of_the_executor_of_a_profile_is_named_with_its_remedy(t
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/config.yaml").write_text(f"executor: {executor}\n")
     with chdir(tmp_path):
-        error = executor_error(["--profile", "mine"])
+        error = problem(parsed("--profile", "mine"))
         assert error.endswith(remedy) and "pip install" in error
-        assert executor_error([]) is None
+        assert problem(parsed()) == ""
 
 
 def test_targets_come_after_all_options_since_snakemake_takes_them_for_configurations():

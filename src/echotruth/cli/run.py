@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.cli.command import add_configuration, fail
-from echotruth.cli.snakemake import cores, executor_error, is_query, option_errors, split_targets, with_profiles
+from echotruth.cli.snakemake import add_options, given, jobs_at_once, problem
 
 if TYPE_CHECKING:
     from echotruth.cases import Case
@@ -28,6 +28,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     add_configuration(parser)
     parser.allow_abbrev = False  # what looks like the beginning of an option may be one of Snakemake
     parser.add_argument("--estimate", action="store_true", help="only print what it will take: jobs, time, disk")
+    add_options(parser)
     parser.add_argument("--yes", action="store_true", help="run it even if its images make no sense")
 
 
@@ -37,12 +38,9 @@ def run(arguments: argparse.Namespace) -> int:
     Run it again to continue what was interrupted. Options that are not listed here are passed to
     Snakemake.
 
-    options of Snakemake that are useful here:
-      --cores N             number of processor cores (default: all)
-      -n                    only list the jobs
-      --profile NAME        where jobs run: default, slurm, or a folder with a config.yaml of Snakemake
+    others that are useful here:
       repository --batch repository=1/4
-                            plan and make a quarter of a large sweep; then 2/4, 3/4, 4/4
+             plan and make a quarter of a large sweep; then 2/4, 3/4, 4/4
 
     examples:
       echotruth run config/demo.yaml
@@ -58,20 +56,18 @@ def run(arguments: argparse.Namespace) -> int:
     from echotruth.cli.configuration import load_cases
     from echotruth.workflow.concerns import concerns
 
-    if errors := option_errors(arguments.options):
-        return fail("\n".join(errors))
+    if wrong := problem(arguments):
+        return fail(wrong)
     config, cases = load_cases(arguments.config)
     if arguments.estimate:
         from echotruth.workflow.cost import table
 
         hearts = len({case.heart for case in cases})
         print(f"{arguments.config}: hearts: {hearts}, cases: {len(cases)}, views of each: {len(config.views)}\n")
-        print(table(config, hearts, len(cases), cores(arguments.options)))
+        print(table(config, hearts, len(cases), jobs_at_once(arguments)))
         return 0
-    if any(map(is_query, arguments.options)):
+    if arguments.dry_run:
         return subprocess.call(_command(arguments))
-    if missing := executor_error(arguments.options):
-        return fail(missing)
     found = list(concerns(config))
     print_concerns(found, arguments.yes)
     if any(concern.is_absurd for concern in found) and not arguments.yes:
@@ -97,8 +93,7 @@ def print_concerns(found: list, is_accepted: bool = False) -> None:
 def _command(arguments: argparse.Namespace) -> list[str]:
     from echotruth.workflow.run import snakemake_command
 
-    options, targets = split_targets(arguments.options)
-    return snakemake_command(arguments.config, with_profiles(options), targets)
+    return snakemake_command(arguments.config, *given(arguments))
 
 
 def _make(arguments: argparse.Namespace, config: Config, cases: list[Case]) -> int:
