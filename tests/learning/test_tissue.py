@@ -11,7 +11,7 @@ from echotruth.config import Bmode, Motion
 from echotruth.config.motion import Affine
 from echotruth.imaging.labels import TissueLabel
 from echotruth.repository.check import check
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.overlay import pictures
 from echotruth.viewer import clip as viewer
 from echotruth.viewer.points import Points
@@ -62,7 +62,7 @@ def test_the_viewer_names_and_colours_them(folder):
 
 def test_they_are_drawn_over_images(folder):
     repository = et.Repository(folder)
-    clip = Clip(repository, repository.every[repository.cases.index[MOUSE]], "mid", 32)
+    clip = ExportedClip(repository, repository.every[repository.cases.index[MOUSE]], "mid", 32)
     drawn, tissue = pictures(clip, ["tissue"])[0], clip.truth("tissue")["tissue"].values[0]
     grey = np.repeat(clip.image[0][..., None], 3, axis=-1)
     np.testing.assert_array_equal((drawn != grey).any(axis=-1)[tissue == 0], False)

@@ -7,6 +7,7 @@ from importlib import import_module
 import echotruth
 from echotruth.cli.command import Parser, add_command, did_you_mean, fail
 from echotruth.extras import MissingPackage, explained
+from echotruth.workflow.lock import LockError
 
 COMMANDS = (
     *("new", "check", "cases", "run", "status", "info", "show"),
@@ -38,11 +39,10 @@ def main() -> None:
         # Whoever read the output has seen enough; the interpreter would tell so at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
-    except MissingPackage as error:
+    except (MissingPackage, LockError, ValueError) as error:
         sys.exit(fail(str(error)))
     except OSError as error:
-        place = f"{error.filename!s:.200}: " if error.filename else ""
-        sys.exit(fail(f"{place}{error.strerror or error}: see that the path is right and you may read and write there"))
+        sys.exit(fail(_of_file(error)))
     sys.exit(ended)
 
 
@@ -59,6 +59,14 @@ def parser() -> Parser:
         module = import_module(f"{__name__}.{name}")
         module.add(add_command(commands, getattr(module, name)))
     return whole
+
+
+def _of_file(error: OSError) -> str:
+    """What the system says of a file, with its name and a remedy, or what echotruth says of it itself."""
+    if error.errno is None:
+        return str(error)
+    place = f"{error.filename!s:.200}: " if error.filename else ""
+    return f"{place}{error.strerror}: see that the path is right and you may read and write there"
 
 
 def _unknown(option: str, command: str, whole: Parser) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from echotruth.cli.command import fail, named
+from echotruth.cli.command import named
 
 if TYPE_CHECKING:
     from echotruth.cases import Case
@@ -65,17 +65,14 @@ def _path(path: str) -> str:
 
 def _check_repository(folder: Path, quick: bool) -> int:
     """Print what is wrong with a repository; return the exit status."""
-    from echotruth.config.loading import ConfigError
     from echotruth.repository.check import check
+    from echotruth.repository.places import repository_folder
 
     def progress(done: int, number: int) -> None:
         if sys.stderr.isatty():
             print(f"\r\033[K{done} of {number} groups" if done < number else "\r\033[K", end="", file=sys.stderr)
 
-    try:
-        found = check(folder.parent if folder.suffix == ".zarr" else folder, progress, quick)
-    except (ConfigError, FileNotFoundError, ValueError) as error:
-        return fail(str(error))
+    found = check(repository_folder(folder), progress, quick)
     print("\n".join(map(str, [*found.faults, *found.notes])) or f"{folder}: nothing is wrong")
     print(f"{found.files} files, {found.groups} groups, {len(found.faults)} faults")
     return int(bool(found.faults))

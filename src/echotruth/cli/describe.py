@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from echotruth.cli.attribution import add_attribution, attribution
-from echotruth.cli.command import fail
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -26,17 +25,9 @@ def describe(arguments: argparse.Namespace) -> int:
       0  all documents are written
       2  it cannot be described
     """
-    from echotruth.config import shipped
-    from echotruth.config.loading import ConfigError
     from echotruth.repository.reader import Repository
-    from echotruth.sharing.description import DescriptionError
     from echotruth.sharing.description import describe as write
 
-    try:
-        repository = Repository(shipped.repository(arguments.repository))
-        documents = write(repository, arguments.output, attribution(arguments))
-    except (DescriptionError, ConfigError, FileNotFoundError) as error:
-        return fail(str(error))
-    for path in documents:
+    for path in write(Repository(arguments.repository), arguments.output, attribution(arguments)):
         print(path)
     return 0

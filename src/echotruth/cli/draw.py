@@ -6,7 +6,6 @@ from pathlib import Path
 
 from echotruth.cli import recording
 from echotruth.cli.command import fail
-from echotruth.echo.failure import EchoError
 from echotruth.echo.wall_file import default_output, part, said
 
 
@@ -50,12 +49,8 @@ def draw(arguments: argparse.Namespace) -> int:
     finds_sector = not (arguments.crop or begin.is_file())
     if finds_sector:
         arguments.crop = "sector"
-    try:
-        clip = recording.read(arguments.clip, arguments, said(begin, "part") or "")
-        server = drawing.DrawingServer(drawing.Drawing(clip, output, arguments.wall), arguments.port)
-    except EchoError as error:
-        return fail(str(error))
-
+    clip = recording.read(arguments.clip, arguments, said(begin, "part") or "")
+    server = drawing.DrawingServer(drawing.Drawing(clip, output, arguments.wall), arguments.port)
     if finds_sector and (shown := part(clip.attrs["part"])):
         crop = " ".join(map(str, shown.crop))
         print(f"{arguments.clip}: shows what moves in it: --crop {crop}", file=sys.stderr)

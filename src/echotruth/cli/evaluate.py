@@ -53,19 +53,15 @@ def evaluate(arguments: argparse.Namespace) -> int:
     from echotruth.evaluation.tracker_options import parse_tracker
     from echotruth.repository.reader import Repository
     from echotruth.workflow.added_tracker import format_row, prepare, summary
-    from echotruth.workflow.lock import LockError
 
     rows = []
-    try:
-        name, settings = parse_tracker(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
-        added = prepare(Repository(arguments.repository), arguments.name or name, settings)
-        case_views = added.case_views(arguments.case, arguments.view)
-        check_runs(added.settings)
-        for row in added.rows(case_views, arguments.jobs):
-            print(format_row(row), flush=True)
-            rows.append(row)
-    except (ValueError, OSError, LockError) as error:
-        return fail(str(error))
+    name, settings = parse_tracker(arguments.tracker, arguments.program, arguments.option, arguments.timeout)
+    added = prepare(Repository(arguments.repository), arguments.name or name, settings)
+    case_views = added.case_views(arguments.case, arguments.view)
+    check_runs(added.settings)
+    for row in added.rows(case_views, arguments.jobs):
+        print(format_row(row), flush=True)
+        rows.append(row)
     if not rows:
         return fail(f"{added.repository.folder}: its hearts are outside their bounds, so that no clip is tracked")
     print(f"\n{summary(rows)}\n\n{added.name} is a tracker of {added.repository.folder}")

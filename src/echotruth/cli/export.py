@@ -55,15 +55,8 @@ def export(arguments: argparse.Namespace) -> int:
         clips, left_out = work.clips()
         for path in work.write(clips):
             print(path, flush=True)
-    except ValueError as error:
-        return fail(str(error))
-    except OSError as error:
-        if error.errno is None:  # there is no such repository
-            return fail(str(error))
-        place, said = error.filename or arguments.output or arguments.repository, error.strerror or str(error)
-        if isinstance(error, FileExistsError | NotADirectoryError):
-            return fail(f"{place}: is a file and not a folder: give another folder with --output")
-        return fail(f"{place}: {' '.join(said.split())}: the folder for the files must be writable and have space")
+    except (FileExistsError, NotADirectoryError) as error:
+        return fail(f"{error.filename}: is a file and not a folder: give another folder with --output")
     except KeyboardInterrupt:
         return fail("interrupted; the files that were named are whole")
     if left_out:

@@ -40,29 +40,25 @@ def infer(arguments: argparse.Namespace) -> int:
 
     table: list[dict[str, object]] = []
     failed = 0
-    try:
-        repository = Repository(arguments.repository)
-        if repository.is_sample and arguments.output is None:
-            return fail(f"{arguments.repository}: is part of the package: name a file by --output")
-        if repository.config.inference.tracker and arguments.output is None:
-            return fail(f"{repository.folder / FILE}: is what the run inferred: name another file by --output")
-        cases = arguments.case or repository.shown
-        output = arguments.output or repository.folder / FILE
-        if not output.parent.is_dir():
-            return fail(f"--output {output}: there is no folder {output.parent}: make it, or name another")
-        for number, case in enumerate(cases, 1):
-            print(f"{number} of {len(cases)}: {case}", file=sys.stderr)
-            try:
-                found = rows(repository, arguments.tracker, case, arguments.size, arguments.errors)
-            except (ValueError, RuntimeError) as error:
-                print(named(f"{case}: {str(error).removeprefix(f'{case}: ')}"), file=sys.stderr)
-                failed += 1
-                continue
-            table += found
-            # After every heart, so that what was inferred is not lost if the rest is stopped.
-            write(output, table_of(table))
-    except (ValueError, OSError) as error:
-        return fail(str(error))
+    repository = Repository(arguments.repository)
+    if repository.is_sample and arguments.output is None:
+        return fail(f"{arguments.repository}: is part of the package: name a file by --output")
+    if repository.config.inference.tracker and arguments.output is None:
+        return fail(f"{repository.folder / FILE}: is what the run inferred: name another file by --output")
+    cases = arguments.case or repository.shown
+    output = arguments.output or repository.folder / FILE
+    if not output.parent.is_dir():
+        return fail(f"--output {output}: there is no folder {output.parent}: make it, or name another")
+    for number, case in enumerate(cases, 1):
+        print(f"{number} of {len(cases)}: {case}", file=sys.stderr)
+        try:
+            table += rows(repository, arguments.tracker, case, arguments.size, arguments.errors)
+        except (ValueError, RuntimeError) as error:
+            print(named(f"{case}: {str(error).removeprefix(f'{case}: ')}"), file=sys.stderr)
+            failed += 1
+            continue
+        # After every heart, so that what was inferred is not lost if the rest is stopped.
+        write(output, table_of(table))
     if not table:
         return 2 if failed else fail(f"{arguments.repository}: has no heart that is complete: run it to its end")
     print(f"Parameters: {output}")

@@ -49,10 +49,8 @@ def info(arguments: argparse.Namespace) -> int:
     try:
         found = Repository(repository_folder(shipped.repository(place)))
         _print(_repository(found))
-    except (FileNotFoundError, ConfigError) as error:
-        return fail(str(error))
-    except OSError as error:
-        return fail(f"{error.filename or place}: cannot be read ({error.strerror or error})")
+    except ConfigError:
+        raise
     except (ValueError, KeyError) as error:
         return fail(f"{place}: is damaged ({' '.join(str(error).split())}): run echotruth check {place}")
     print(f'\nOpen it:\n  import echotruth as et\n  repository = et.Repository("{place}")')

@@ -29,21 +29,17 @@ def merge(arguments: argparse.Namespace) -> int:
     """
     from echotruth.cli.configuration import load_cases
     from echotruth.config import shipped
-    from echotruth.repository.group import ChecksumError
     from echotruth.repository.places import repository_folder
-    from echotruth.workflow.lock import LockError, is_held
+    from echotruth.workflow.lock import is_held
     from echotruth.workflow.merging import merge
     from echotruth.workflow.plan import Plan
 
     config, _ = load_cases(arguments.config)
     plan = Plan(config.model_dump(), arguments.config)
-    try:
-        sources = [repository_folder(shipped.repository(source)) for source in arguments.sources]
-        if busy := [source for source in sources if is_held(source)]:
-            return fail(f"{busy[0]}: a run works on it: wait for it")
-        plan.begin()
-        copied = merge(plan, sources)
-    except (FileNotFoundError, LockError, ChecksumError) as error:
-        return fail(str(error))
+    sources = [repository_folder(shipped.repository(source)) for source in arguments.sources]
+    if busy := [source for source in sources if is_held(source)]:
+        return fail(f"{busy[0]}: a run works on it: wait for it")
+    plan.begin()
+    copied = merge(plan, sources)
     print(f"{plan.folder}: {copied} hearts and clips are copied: echotruth run {arguments.config} makes the rest")
     return 0

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from echotruth.cli.attribution import add_attribution, attribution
-from echotruth.cli.command import count, fail
+from echotruth.cli.command import count
 
 
 def add(parser: argparse.ArgumentParser) -> None:
@@ -33,20 +33,12 @@ def release(arguments: argparse.Namespace) -> int:
       0  all files are written
       2  it cannot be released
     """
-    from echotruth.config import shipped
-    from echotruth.config.loading import ConfigError
     from echotruth.repository.reader import Repository
-    from echotruth.sharing.description import DescriptionError
-    from echotruth.sharing.release import ReleaseError
     from echotruth.sharing.release import release as write
 
-    try:
-        repository = Repository(shipped.repository(arguments.repository))
-        name = f"{repository.config.name}-release"
-        folder = arguments.to or (Path("out") if repository.is_sample else repository.folder.parent) / name
-        files = write(repository, folder, attribution(arguments), arguments.part_mb * 10**6)
-    except (ReleaseError, DescriptionError, ConfigError, FileNotFoundError) as error:
-        return fail(str(error))
-    for path in files:
+    repository = Repository(arguments.repository)
+    name = f"{repository.config.name}-release"
+    folder = arguments.to or (Path("out") if repository.is_sample else repository.folder.parent) / name
+    for path in write(repository, folder, attribution(arguments), arguments.part_mb * 10**6):
         print(path)
     return 0

@@ -99,17 +99,14 @@ def _command(arguments: argparse.Namespace) -> list[str]:
 def _make(arguments: argparse.Namespace, config: Config, cases: list[Case]) -> int:
     """Make a repository and its report; return the exit status."""
     from echotruth.repository.status import imaged
-    from echotruth.workflow import cost, lock
+    from echotruth.workflow import cost
     from echotruth.workflow.progress import Progress
     from echotruth.workflow.run import execute
     from echotruth.workflow.status import status_of, verdicts
 
     start, folder = time.time(), Path("out") / config.name
     progress = Progress({rule: cost.seconds(rule, config) for rule in cost.SECONDS})
-    try:
-        status = execute(_command(arguments), folder, progress)
-    except lock.LockError as error:
-        return fail(str(error))
+    status = execute(_command(arguments), folder, progress)
     if status == REFUSED:
         return fail("Snakemake does not take these options: see echotruth run --help")
     if status:

@@ -29,17 +29,11 @@ def show(arguments: argparse.Namespace) -> int:
     """
     import webbrowser
 
-    from echotruth.config.loading import ConfigError
     from echotruth.viewer import server
 
     if not 0 <= arguments.port <= 65535:
         return fail(f"--port {arguments.port}: give a number from 1 to 65535, or none for any that is free")
-    try:
-        served = server.serve(arguments.repository, arguments.port)
-    except (server.ShowError, ConfigError) as error:
-        return fail(str(error))
-    except OSError as error:
-        return fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    served = server.serve(arguments.repository, arguments.port)
 
     def ready() -> None:
         address = server.address(served)

@@ -4,8 +4,6 @@ import argparse
 import json
 from pathlib import Path
 
-from echotruth.cli.command import fail
-
 EXIT = {"finished": 0, "stopped": 1, "running": 3}
 """Exit status by the state of the repository."""
 
@@ -34,13 +32,9 @@ def status(arguments: argparse.Namespace) -> int:
       3  a run works on it
     """
     from echotruth.config import shipped
-    from echotruth.config.loading import ConfigError
+    from echotruth.repository.places import repository_folder
     from echotruth.workflow.status import status_of, text
 
-    path = Path(shipped.repository(arguments.path))
-    try:
-        found = status_of(path.parent if path.suffix == ".zarr" else path)
-    except (ConfigError, FileNotFoundError, ValueError) as error:
-        return fail(str(error))
+    found = status_of(repository_folder(shipped.repository(arguments.path)))
     print(json.dumps(found, indent=2) if arguments.json else text(found))
     return EXIT[found["state"]]

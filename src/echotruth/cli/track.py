@@ -58,11 +58,8 @@ def track(arguments: argparse.Namespace) -> int:
     clips: list[Path] = arguments.clip
     walls = [arguments.wall or default_output(path) for path in clips]
     table = arguments.output / "strain.csv"
-    try:
-        _check_options(arguments)
-        names = _names(clips, walls, arguments.output, _sources(table))
-    except (EchoError, ValueError) as error:
-        return fail(str(error))
+    _check_options(arguments)
+    names = _names(clips, walls, arguments.output, _sources(table))
     lacking = [_lacking(path, wall, arguments) for path, wall in zip(clips, walls, strict=True)]
     if all(lacking):
         return fail("\n".join(lacking))

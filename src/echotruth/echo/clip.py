@@ -13,7 +13,7 @@ from echotruth.arrays import Floats
 from echotruth.echo import files, sector
 from echotruth.echo.failure import FEWEST_FRAMES, EchoError, unsaid
 from echotruth.echo.recording import Recording, check_size
-from echotruth.echo.wall_file import Part
+from echotruth.echo.wall_file import Excerpt
 from echotruth.echo.wall_file import part as part_of
 
 SQUARE = 1e-3
@@ -90,7 +90,7 @@ def read_clip(
     if crop == "sector":
         crop = sector.find(recording.frames)
     crop = crop or (0, 0, width, height)
-    shown = Part((first, stop), (crop[0], crop[1], crop[2], crop[3]))
+    shown = Excerpt((first, stop), (crop[0], crop[1], crop[2], crop[3]))
     frames = _cropped(recording.frames[first:stop], shown.crop, name)
     frames, spacing = _square(frames, _spacing(recording, spacing_mm, name))
     axial, lateral = (np.arange(size) * spacing for size in frames.shape[1:])

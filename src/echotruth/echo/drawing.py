@@ -20,7 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from echotruth.echo.failure import FEWEST_FRAMES, EchoError
 from echotruth.echo.wall import PARTS, View, Wall, clicked_points, read_wall, write_wall
-from echotruth.echo.wall_file import Part, part, said
+from echotruth.echo.wall_file import Excerpt, part, said
 
 LOCAL = "127.0.0.1"
 
@@ -117,10 +117,10 @@ class Drawing:
         return read_wall(self.begin, said(self.begin, "view") or "short_axis")
 
     @property
-    def _shown(self) -> Part:
+    def _shown(self) -> Excerpt:
         """Frames and pixels of the recording that the page shows."""
         frames, axial, lateral = self.clip["image"].shape
-        return part(self.clip.attrs.get("part", "")) or Part((0, frames), (0, 0, lateral, axial))
+        return part(self.clip.attrs.get("part", "")) or Excerpt((0, frames), (0, 0, lateral, axial))
 
     def _cycle(self, wall: Wall | None) -> tuple[int, int]:
         """Frames of the page at end-diastole and the next: those of the wall, or the first and the end of the clip.
@@ -212,7 +212,7 @@ class Drawing:
         if not 0 <= first <= stop - FEWEST_FRAMES <= self.clip.sizes["frame"] - FEWEST_FRAMES:
             raise EchoError(f"cycle: frames {first} to {stop} are none of {FEWEST_FRAMES} or more frames of the clip")
         start = self._shown.cycle[0]
-        return Wall(*borders, drawn.view, insertions, str(Part((start + first, start + stop), self._shown.crop)))
+        return Wall(*borders, drawn.view, insertions, str(Excerpt((start + first, start + stop), self._shown.crop)))
 
 
 def _points(wall: Wall) -> dict[str, list[list[float]]]:

@@ -9,7 +9,7 @@ from echotruth.echo.failure import EchoError
 
 
 @dataclass(frozen=True)
-class Part:
+class Excerpt:
     """Frames and pixels of a recording that a clip shows, as "cycle 31 59, crop 120 40 520 440".
 
     Attributes
@@ -32,7 +32,7 @@ class Part:
         return self.cycle[0], *self.crop[:2]
 
 
-def part(text: str) -> Part | None:
+def part(text: str) -> Excerpt | None:
     """The part that a text names, or None of an empty one.
 
     Raises
@@ -49,7 +49,7 @@ def part(text: str) -> Part | None:
             'RIGHT BOTTOM" in its place, which are what was given as --cycle and --crop'
         )
     first, stop, left, top, right, bottom = map(int, match.groups())
-    return Part((first, stop), (left, top, right, bottom))
+    return Excerpt((first, stop), (left, top, right, bottom))
 
 
 def said(file: Path, what: str) -> str | None:

@@ -12,7 +12,7 @@ from known_repository import FRAMES, SHIFT, SIZES
 
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import ExportError, mp4
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 PERIOD = 0.12
 """Of the default cycle of a mouse, s."""
@@ -159,7 +159,7 @@ def test_depth_scale_has_its_marks_where_the_depth_is_and_the_dot_runs_with_time
 
 
 def test_video_of_an_odd_number_of_pixels_keeps_its_scale(known, tmp_path):
-    clip = Clip(Repository(known.folder), known.case, "mid", 127)
+    clip = ExportedClip(Repository(known.folder), known.case, "mid", 127)
     clip.__dict__["image"] = known.images(SIZES[0])[:, :127, :127]
     mp4.write(clip, tmp_path / "odd.mp4", (), 20.0)
     found, _ = frames(tmp_path / "odd.mp4")

@@ -12,7 +12,7 @@ from echotruth.repository.checksums import CHECKSUMS
 from echotruth.repository.reader import Repository
 from echotruth.repository.status import ALWAYS, is_label
 from echotruth.sharing.description.attribution import Attribution, Author
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 CLIPS = "clips.csv"
 COLUMNS = {
@@ -69,7 +69,9 @@ class Facts:
     def clips_table(self) -> bytes:
         """Table of the clips, a row for everything that has B-mode images."""
         found, sizes = self.repository.finished(None, None, "bmode"), sorted(self.repository.sizes)
-        clips = [Clip(self.repository, case, view, size) for case, views in found for view in views for size in sizes]
+        clips = [
+            ExportedClip(self.repository, case, view, size) for case, views in found for view in views for size in sizes
+        ]
         return pd.DataFrame(map(_row, clips), columns=list(COLUMNS)).to_csv(index=False).encode()
 
 
@@ -86,7 +88,7 @@ def read_facts(repository: Repository, given: Attribution) -> Facts:
     return Facts(repository, given._replace(authors=authors), ended)
 
 
-def _row(clip: Clip) -> tuple[Any, ...]:
+def _row(clip: ExportedClip) -> tuple[Any, ...]:
     path = clip.repository.path(f"bmode/{clip.size}/image", clip.case.id, clip.view)
     times = len(clip.time), f"{clip.frame_time:.9g}"
     return clip.case.id, clip.view, clip.size, *times, f"{clip.spacing:.9g}", path

@@ -15,7 +15,7 @@ from typing import Literal
 from echotruth.config import shipped
 from echotruth.repository.choice import chosen
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.destination import draft
 from echotruth.sharing.export.error import ExportError
 
@@ -54,7 +54,7 @@ class Format:
         """Whether an option, or a choice of views or sizes, does something for it."""
         return option in (*self.options, *{"clip": ("views", "sizes"), "view": ("views",), "heart": ()}[self.holds])
 
-    def problem(self, clip: Clip) -> str:
+    def problem(self, clip: ExportedClip) -> str:
         """Why a clip, view or heart cannot be exported, in one sentence; "" if it can."""
         return clip.repository.problem(clip.case.id, clip.view, "mechanics", *self.stages)
 
@@ -146,7 +146,7 @@ class Export:
         named, own = self.selection.trackers, list(self.repository.config.tracking.trackers)
         return chosen("tracker", named, self.repository.trackers if named else own)
 
-    def clips(self) -> tuple[list[Clip], list[str]]:
+    def clips(self) -> tuple[list[ExportedClip], list[str]]:
         """What is to be written, and why other things are left out.
 
         Raises
@@ -164,16 +164,16 @@ class Export:
             raise ExportError(problems[0])
         return found, problems
 
-    def _asked(self, holds: str) -> Iterator[Clip]:
+    def _asked(self, holds: str) -> Iterator[ExportedClip]:
         """The clips, views or hearts that are asked for."""
         cases, views = self.repository.every, self.repository.views
         sizes = self.selection.sizes or self.repository.sizes[:1]
         for case in chosen("case", self.selection.cases, cases):
             for view in [""] if holds == "heart" else chosen("view", self.selection.views, views):
                 for size in chosen("size", sizes, self.repository.sizes) if holds == "clip" else [0]:
-                    yield Clip(self.repository, cases[case], view, size)
+                    yield ExportedClip(self.repository, cases[case], view, size)
 
-    def write(self, clips: Sequence[Clip]) -> Iterator[Path]:
+    def write(self, clips: Sequence[ExportedClip]) -> Iterator[Path]:
         """Write a file or folder for each clip, view or heart, and give its path when it is whole.
 
         The table of a format is written last, unless `output` is the path of a single file.
@@ -208,7 +208,7 @@ class Export:
         suffix = FORMATS[self.format].suffix
         return bool(suffix) and self._output.name.endswith(suffix) and not self._output.is_dir()
 
-    def _targets(self, clips: Sequence[Clip]) -> list[Path]:
+    def _targets(self, clips: Sequence[ExportedClip]) -> list[Path]:
         if self._is_file:
             if len(clips) > 1:
                 remedy = "give a folder, or choose one with --case, --view and --size"
@@ -218,7 +218,7 @@ class Export:
 
 
 @contextmanager
-def _told(clip: Clip) -> Iterator[None]:
+def _told(clip: ExportedClip) -> Iterator[None]:
     """Tell in a sentence that a clip cannot be read."""
     try:
         yield

@@ -18,7 +18,7 @@ from echotruth.repository.reader import Repository
 
 
 @dataclass(frozen=True)
-class Clip:
+class ExportedClip:
     """A heart, one of its views, or one of its clips.
 
     Attributes

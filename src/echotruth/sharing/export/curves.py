@@ -9,7 +9,7 @@ import xarray as xr
 
 from echotruth.arrays import Floats
 from echotruth.fem.volume import cell_volumes
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 COMPONENTS = ("RR", "CC", "LL")
 """Of the heart's strain: radial, circumferential, longitudinal."""
@@ -33,7 +33,7 @@ COLUMNS = (
 """Columns of the curves."""
 
 
-def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
+def write(clip: ExportedClip, path: Path, trackers: Sequence[str]) -> None:
     """Write the curves of the heart, and what each tracker found in the clip beside its truth.
 
     Empty cells are unknown: the pressure of a prescribed motion, or a segment that a view does not show. The tracker of
@@ -41,7 +41,7 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
     trackers : sequence of str
     """
@@ -55,12 +55,12 @@ def write(clip: Clip, path: Path, trackers: Sequence[str]) -> None:
     table[list(COLUMNS)].to_csv(path, index=False, float_format="%.9g", lineterminator="\n")
 
 
-def write_summary(clips: Sequence[Clip], path: Path, trackers: Sequence[str]) -> None:
+def write_summary(clips: Sequence[ExportedClip], path: Path, trackers: Sequence[str]) -> None:
     """Write the table of :meth:`echotruth.Repository.summary` of some clips.
 
     Parameters
     ----------
-    clips : sequence of Clip
+    clips : sequence of ExportedClip
         Of one repository.
     path : Path
     trackers : sequence of str
@@ -77,12 +77,12 @@ def _rows(true: Floats, unit: str, **about: str) -> pd.DataFrame:
     return pd.DataFrame({"frame": np.arange(len(true)), "true": true, "tracked": np.nan, "unit": unit, **about})
 
 
-def _heart(clip: Clip) -> Iterator[pd.DataFrame]:
+def _heart(clip: ExportedClip) -> Iterator[pd.DataFrame]:
     for quantity, (group, array, factor, unit) in CURVES.items():
         yield _rows(factor * clip.repository.arrays(group, clip.case.id, None, array)[array], unit, quantity=quantity)
 
 
-def _heart_strain(clip: Clip) -> Iterator[pd.DataFrame]:
+def _heart_strain(clip: ExportedClip) -> Iterator[pd.DataFrame]:
     """Green-Lagrange strain of the wall and of its segments since end-diastole, %."""
     found = clip.repository.arrays("kinematics", clip.case.id, None, "strain", "strain_mean")
     strain, wall = found["strain"], found["strain_mean"]

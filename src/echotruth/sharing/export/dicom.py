@@ -13,7 +13,7 @@ from uuid import UUID
 import numpy as np
 
 import echotruth
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import optional
 
 US_MULTI_FRAME = "1.2.840.10008.5.1.4.1.1.3.1"
@@ -31,14 +31,14 @@ NO_DATE, NO_TIME = "19000101", "000000"
 NOTICE = "SYNTHETIC image simulated by echotruth. No patient, not for clinical use."
 
 
-def write(clip: Clip, path: Path) -> None:
+def write(clip: ExportedClip, path: Path) -> None:
     """Write a clip with its calibrated region and its frame time.
 
     Its identifiers are hashes of what it shows (a study is a heart, a series a view): the bytes are the same twice.
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
 
     Raises
@@ -63,7 +63,7 @@ def write(clip: Clip, path: Path) -> None:
     path.write_bytes(file.getvalue())
 
 
-def _subject(image: Any, clip: Clip) -> None:
+def _subject(image: Any, clip: ExportedClip) -> None:
     """Patient and study: the heart, which is synthetic."""
     name, case = clip.case.config.name, clip.case.id
     image.SpecificCharacterSet = "ISO_IR 192"
@@ -77,7 +77,7 @@ def _subject(image: Any, clip: Clip) -> None:
     image.StudyDescription = f"Synthetic heart {case}"[:64]
 
 
-def _series(image: Any, clip: Clip) -> None:
+def _series(image: Any, clip: ExportedClip) -> None:
     """Series, equipment and identity: a view, and in it one instance for each size."""
     image.Modality = "US"
     image.SeriesInstanceUID = _uid("series", *_heart(clip), clip.view.encode())
@@ -91,7 +91,7 @@ def _series(image: Any, clip: Clip) -> None:
     image.InstanceNumber = clip.case.config.bmode.sizes.index(clip.size) + 1
 
 
-def _pixels(image: Any, clip: Clip) -> None:
+def _pixels(image: Any, clip: ExportedClip) -> None:
     """Image, its pixels and its time."""
     frames, rows, columns = clip.image.shape
     image.ImageType = ["ORIGINAL", "PRIMARY", "TTE", "0001"]  # transthoracic, two-dimensional (PS3.3 C.8.5.6.1.1)
@@ -110,7 +110,7 @@ def _pixels(image: Any, clip: Clip) -> None:
     image.add_new(0x7FE00010, "OB", clip.image.tobytes() + b"\0" * (clip.image.size % 2))
 
 
-def _calibrate(region: Any, clip: Clip) -> None:
+def _calibrate(region: Any, clip: ExportedClip) -> None:
     """Region of the whole image: lateral and axial position of its pixels, cm."""
     region.RegionSpatialFormat, region.RegionDataType, region.RegionFlags = TWO_DIMENSIONAL, TISSUE, 0
     region.RegionLocationMinX0 = region.RegionLocationMinY0 = 0
@@ -123,7 +123,7 @@ def _calibrate(region: Any, clip: Clip) -> None:
     region.TransducerFrequency = round(clip.case.config.probe.si().frequency / 1e3)  # kHz
 
 
-def _heart(clip: Clip) -> tuple[bytes, ...]:
+def _heart(clip: ExportedClip) -> tuple[bytes, ...]:
     """What tells one heart from another: its name and its motion."""
     names = f"{clip.case.config.name}/{clip.case.id}".encode()
     return names, np.ascontiguousarray(clip.heart.nodes).tobytes(), clip.heart.displacement.tobytes()

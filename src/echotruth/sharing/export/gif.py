@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import ExportError
 from echotruth.sharing.export.overlay import pictures
 
@@ -15,12 +15,12 @@ MAX_RATE = 50
 """Frames per second that browsers show: they take shorter times for a mistake."""
 
 
-def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
+def write(clip: ExportedClip, path: Path, overlay: Sequence[str], rate: float) -> None:
     """Write a looping animation; its comment holds the scale and the frame time of the heart as JSON.
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
     overlay : sequence of str
         As :func:`echotruth.sharing.export.overlay.pictures` takes them.

@@ -8,7 +8,7 @@ from pathlib import Path
 import imageio_ffmpeg
 import numpy as np
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import ExportError
 from echotruth.sharing.export.overlay import pictures
 
@@ -16,14 +16,14 @@ QUALITY = "12"
 """Constant rate factor of x264: grey levels of the default heart's wall err by 2.3 (RMS), 1 % by more than 7."""
 
 
-def write(clip: Clip, path: Path, overlay: Sequence[str], rate: float) -> None:
+def write(clip: ExportedClip, path: Path, overlay: Sequence[str], rate: float) -> None:
     """Write a video; its comment holds the scale and the frame time of the heart as JSON.
 
     A side of an odd number of pixels gets one more, black, at the right and the bottom, which H.264 needs.
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
     overlay : sequence of str
         As :func:`echotruth.sharing.export.overlay.pictures` takes them.

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import optional
 
 MM = 1e3
@@ -16,7 +16,7 @@ ALIGNED = 2
 """`NIFTI_XFORM_ALIGNED_ANAT`: the world is neither that of a scanner nor a template."""
 
 
-def write(clip: Clip, path: Path) -> None:
+def write(clip: ExportedClip, path: Path) -> None:
     """Write grey levels, (lateral, axial, 1, frame), with the affine to the frame of the heart.
 
     The plane is given the thickness of a pixel, since the format needs one. The frame of the heart stands in place of
@@ -24,7 +24,7 @@ def write(clip: Clip, path: Path) -> None:
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
 
     Raises
@@ -45,7 +45,7 @@ def write(clip: Clip, path: Path) -> None:
         packed.write(image.to_bytes())
 
 
-def affine(clip: Clip) -> NDArray[np.float64]:
+def affine(clip: ExportedClip) -> NDArray[np.float64]:
     """Matrix from voxel (lateral, axial, 0, 1) to the frame of the heart at end-diastole, mm, (4, 4)."""
     corner = clip.plane.to_heart(np.array([clip.lateral[0], clip.axial[0], 0.0]))
     matrix = np.eye(4)

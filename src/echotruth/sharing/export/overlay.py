@@ -9,7 +9,7 @@ from PIL import Image, ImageColor, ImageDraw, ImageFont
 
 from echotruth.arrays import Floats
 from echotruth.report.palette import BORDER, MOTION, SEGMENTS, TISSUES
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 OPACITY = 0.35
 """Of the colours of segments and tissues."""
@@ -29,12 +29,12 @@ _DETAIL = 4
 Pictures = NDArray[np.uint8]
 
 
-def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
+def pictures(clip: ExportedClip, overlay: Sequence[str]) -> Pictures:
     """Images of a clip with what is to be drawn over them.
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     overlay : sequence of {"wall", "segments", "tissue", "displacement", "scale"}
         The border of the wall; the AHA segments in colour; all tissues in colour; arrows from where points of the
         tissue were at end-diastole to where they are; a depth scale, the time since end-diastole, and a line of the
@@ -52,12 +52,12 @@ def pictures(clip: Clip, overlay: Sequence[str]) -> Pictures:
     return found
 
 
-def _segments(clip: Clip, frames: Pictures) -> None:
+def _segments(clip: ExportedClip, frames: Pictures) -> None:
     """Colour the segments, those of AHA next to each other differently."""
     _tint(frames, clip.truth("segment")["segment"].values, SEGMENTS)
 
 
-def _tissue(clip: Clip, frames: Pictures) -> None:
+def _tissue(clip: ExportedClip, frames: Pictures) -> None:
     """Colour the tissues."""
     _tint(frames, clip.truth("tissue")["tissue"].values, TISSUES)
 
@@ -70,7 +70,7 @@ def _tint(frames: Pictures, labels: Pictures, palette: Sequence[str]) -> None:
         frame[:] = np.where(numbers[..., None] > 0, np.round(tinted), frame)
 
 
-def _wall(clip: Clip, frames: Pictures) -> None:
+def _wall(clip: ExportedClip, frames: Pictures) -> None:
     """Draw the border of the wall, half-way between the centres of pixels in and out of it."""
     for frame, mask in zip(frames, clip.truth("mask")["mask"].values, strict=True):
         inside = np.pad(mask.astype(bool), 1)
@@ -85,7 +85,7 @@ def _wall(clip: Clip, frames: Pictures) -> None:
                     draw.line(ends, 255, _DETAIL * _thickness(clip))
 
 
-def _displacement(clip: Clip, frames: Pictures) -> None:
+def _displacement(clip: ExportedClip, frames: Pictures) -> None:
     """Draw an arrow for each point of a grid that is in the wall at end-diastole."""
     step, radius = max(1, clip.size // ARROWS_ALONG_SIDE), _thickness(clip)
     position = clip.tracks(step)["pixel"].values
@@ -96,7 +96,7 @@ def _displacement(clip: Clip, frames: Pictures) -> None:
                 draw.ellipse(_fine(np.stack([end - radius, end + radius])), 255)
 
 
-def _scale(clip: Clip, frames: Pictures) -> None:
+def _scale(clip: ExportedClip, frames: Pictures) -> None:
     """Draw the depth scale at the right, and the time and the line of the beat at the bottom."""
     size, margin, thickness = clip.size, round(0.03 * clip.size), _thickness(clip)
     step = _round_step(size * clip.spacing / DEPTHS)
@@ -159,6 +159,6 @@ def _fine(position: Floats) -> list[tuple[float, float]]:
     return [tuple(place) for place in (_DETAIL * (position + 0.5) - 0.5).tolist()]
 
 
-def _thickness(clip: Clip) -> int:
+def _thickness(clip: ExportedClip) -> int:
     """Width of lines, px."""
     return max(1, round(clip.size / 300))

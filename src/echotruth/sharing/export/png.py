@@ -6,21 +6,21 @@ from pathlib import Path
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.overlay import pictures
 
 INCH = 0.0254
 """m"""
 
 
-def write(clip: Clip, path: Path, overlay: Sequence[str]) -> None:
+def write(clip: ExportedClip, path: Path, overlay: Sequence[str]) -> None:
     """Write frame_000.png and so on: grey levels as they are, or RGB with an overlay.
 
     Each has its pixels per metre, and the scale and frame time as JSON in the text "Comment".
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
         Folder.
     overlay : sequence of str

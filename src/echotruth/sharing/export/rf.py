@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 
-def open_rf(clip: Clip) -> xr.Dataset:
+def open_rf(clip: ExportedClip) -> xr.Dataset:
     """Open the group `rf` of a view, without reading its arrays."""
     group = clip.repository.path("rf", clip.case.id, clip.view)
     return xr.open_zarr(clip.repository.store, group=group, consolidated=False, chunks=None, zarr_format=3)

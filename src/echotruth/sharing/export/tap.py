@@ -10,25 +10,25 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 POINTS_ALONG_SIDE = 64
 """Points along the side of an image that is all wall."""
 
 
-def write(clip: Clip, path: Path) -> None:
+def write(clip: ExportedClip, path: Path) -> None:
     """Write the :func:`arrays` of a clip as a NumPy archive (.npz).
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
     path : Path
     """
     with path.open("wb") as file:
         np.savez_compressed(file, **arrays(clip))
 
 
-def arrays(clip: Clip) -> dict[str, Any]:
+def arrays(clip: ExportedClip) -> dict[str, Any]:
     """Video and paths of the points of a grid that are in the wall at end-diastole.
 
     x is 0 at the left edge of the image and 1 at the right one, y is 0 at the upper edge, nearest the array, and 1 at
@@ -38,7 +38,7 @@ def arrays(clip: Clip) -> dict[str, Any]:
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
 
     Returns
     -------

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import optional
 from echotruth.sharing.export.rf import open_rf, sample_positions, scaled_channels
 
@@ -25,7 +25,7 @@ SPHERICAL = 1
 """`uff.wavefront.spherical`"""
 
 
-def write(clip: Clip, path: Path) -> None:
+def write(clip: ExportedClip, path: Path) -> None:
     """Write the lines of a view as `beamformed_data`, and its channels, if they are kept, as `channel_data`."""
     h5py = optional("h5py")
     with h5py.File(path, "w") as file:

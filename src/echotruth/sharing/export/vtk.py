@@ -10,13 +10,13 @@ from echotruth.arrays import Floats
 from echotruth.fem.tetrahedra import MaterialPoints, gradient
 from echotruth.heart import Heart
 from echotruth.mechanics.fibres import CENTROID, unit
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 
 QUADRATIC_TETRA = 24
 """Type of cell in VTK."""
 
 
-def write(clip: Clip, path: Path) -> None:
+def write(clip: ExportedClip, path: Path) -> None:
     """Write the mesh of every frame in the frame of the heart, m, with its fields.
 
     At nodes: displacement since end-diastole (m) and wall depth. In cells, at their centroids: strain since
@@ -24,7 +24,7 @@ def write(clip: Clip, path: Path) -> None:
 
     Parameters
     ----------
-    clip : Clip
+    clip : ExportedClip
         The heart.
     path : Path
         Folder.

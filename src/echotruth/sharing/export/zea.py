@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
-from echotruth.sharing.export.clip import Clip
+from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import optional
 from echotruth.sharing.export.rf import open_rf, sample_positions, scaled_channels
 
@@ -21,7 +21,7 @@ SOURCE_DISTANCE = 1e-6
 """Distance of the virtual source of a wave behind its element, m: 0 would mean a plane wave."""
 
 
-def write(clip: Clip, path: Path) -> None:
+def write(clip: ExportedClip, path: Path) -> None:
     """Write the lines of a view as `beamformed_data`, and its channels, if they are kept, as `raw_data`."""
     with optional("h5py").File(path, "w") as file:
         rf = open_rf(clip)
