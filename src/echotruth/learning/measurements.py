@@ -17,27 +17,10 @@ INFARCT = 1
 def measurements(repository: Repository, case: str) -> dict[str, Floats | float]:
     """Measured function of a heart and its `scar_size`; nothing of one that was not solved."""
     try:
-        return physiology(repository, case) | {"scar_size": scar_size(repository, case)}
+        found = repository.arrays("physiology", case, None, *PHYSIOLOGY)
+        return found | {"scar_size": scar_size(repository, case)}
     except NotWritten:
         return {}
-
-
-def physiology(repository: Repository, case: str, names: tuple[str, ...] = PHYSIOLOGY) -> dict[str, Floats]:
-    """Measured function of a heart.
-
-    Parameters
-    ----------
-    repository : Repository
-    case : str
-    names : tuple of str
-        Scalars of the group `physiology`.
-
-    Returns
-    -------
-    dict of ndarray of shape ()
-        By name, in the units of docs/schema.md.
-    """
-    return repository.arrays("physiology", case, None, *names)
 
 
 def scar_size(repository: Repository, case: str) -> float:

@@ -12,9 +12,8 @@ from echotruth.sharing.release import release
 
 @pytest.mark.parametrize("write", [release, describe])
 def test_missing_extra_is_told_in_one_sentence_and_nothing_is_written(tmp_path, monkeypatch, write):
-    monkeypatch.delitem(sys.modules, "echotruth.sharing.description.croissant", raising=False)
     monkeypatch.setitem(sys.modules, "mlcroissant", None)
     with pytest.raises(DescriptionError) as told:
         write(et.sample(), tmp_path / "files")
-    assert str(told.value) == f"{write.__name__} needs the package mlcroissant: {installation('description')}"
+    assert str(told.value) == f"a description needs the package mlcroissant: {installation('description')}"
     assert not any(tmp_path.iterdir())

@@ -1,16 +1,17 @@
 """Documents by which others find, judge, read and cite a repository."""
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from echotruth import files
 from echotruth.config import shipped
-from echotruth.extras import installation
 from echotruth.repository.reader import Repository
 from echotruth.sharing.description import citation, statements
 from echotruth.sharing.description.attribution import Attribution
-from echotruth.sharing.description.facts import CLIPS, DescriptionError, read_facts
+from echotruth.sharing.description.facts import CLIPS, DescriptionError, Facts, read_facts
 
-__all__ = ["DescriptionError", "describe"]
+__all__ = ["DescriptionError", "describe", "documents"]
 
 
 def describe(repository: Repository, output: Path | None = None, given: Attribution | None = None) -> list[Path]:
@@ -34,23 +35,24 @@ def describe(repository: Repository, output: Path | None = None, given: Attribut
     if shipped.is_sample(folder):
         remedy = "give another folder with --output"
         raise DescriptionError(f"{folder}: comes with the package and is not written to: {remedy}")
-    try:
-        from echotruth.sharing.description.croissant import croissant
-    except ModuleNotFoundError as error:
-        remedy = installation("description")
-        raise DescriptionError(f"describe needs the package {error.name}: {remedy}") from None
+    facts = read_facts(repository, given or Attribution())
     for name, mark in {"README.md": statements.MARK, "CITATION.cff": citation.MARK}.items():
         if (folder / name).is_file() and not (folder / name).read_bytes().startswith(mark.encode()):
             remedy = "move it away, or choose another --output"
             raise DescriptionError(f"{folder / name}: was not made by echotruth describe: {remedy}")
-    facts = read_facts(repository, given or Attribution())
-    said = statements.statements(facts)
-    documents = {
-        CLIPS: facts.clips_table,
-        "README.md": statements.card(facts, said),
-        "CITATION.cff": citation.citation(facts, said),
-        "croissant.json": croissant(facts, said),
-    }
-    for name, content in documents.items():
+    found = documents(facts, statements.statements(facts))
+    for name, content in found.items():
         files.update(folder / name, content)
-    return [folder / name for name in documents]
+    return [folder / name for name in found]
+
+
+def documents(facts: Facts, said: dict[str, Any], parts: Sequence[tuple[str, int, str]] = ()) -> dict[str, bytes]:
+    """Documents by the names of their files; those of a release have parts: name, bytes and SHA-256 of each."""
+    from echotruth.sharing.description.croissant import croissant
+
+    return {
+        CLIPS: facts.clips_table,
+        "README.md": statements.card(facts, said, bool(parts)),
+        "CITATION.cff": citation.citation(facts, said),
+        "croissant.json": croissant(facts, said, parts),
+    }

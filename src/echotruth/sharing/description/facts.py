@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from functools import cached_property
+from importlib.util import find_spec
 from typing import Any
 
 import pandas as pd
 
+from echotruth.extras import installation
 from echotruth.repository.check import check
 from echotruth.repository.checksums import CHECKSUMS
 from echotruth.repository.reader import Repository
@@ -76,7 +78,9 @@ class Facts:
 
 
 def read_facts(repository: Repository, given: Attribution) -> Facts:
-    """Read what is to be known of a repository; DescriptionError if it is not finished, or damaged."""
+    """Read what is to be known of a repository; DescriptionError if it is not finished, or cannot be described."""
+    if find_spec("mlcroissant") is None:
+        raise DescriptionError(f"a description needs the package mlcroissant: {installation('description')}")
     folder, report = repository.folder, check(repository.folder, quick=True)
     unpublished = [] if (folder / CHECKSUMS).is_file() else report.notes
     if problems := [*unpublished, *map(str, report.faults)]:

@@ -1,7 +1,6 @@
 """A repository as the files that one would upload: parts with their checksums, a card, metadata and an evaluator."""
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from shutil import rmtree
 from typing import Any
@@ -10,12 +9,12 @@ import yaml
 
 from echotruth import files
 from echotruth.config import shipped
-from echotruth.extras import installation
 from echotruth.repository.reader import Repository
+from echotruth.sharing.description import documents
 from echotruth.sharing.description.attribution import Attribution
-from echotruth.sharing.description.citation import citation, filled
-from echotruth.sharing.description.facts import CLIPS, DescriptionError, Facts, read_facts
-from echotruth.sharing.description.statements import card, statements
+from echotruth.sharing.description.citation import filled
+from echotruth.sharing.description.facts import Facts, read_facts
+from echotruth.sharing.description.statements import statements
 from echotruth.sharing.fetching import PARTS, REGISTRY
 from echotruth.sharing.release import evaluate
 from echotruth.sharing.release.parts import Part, registry, table, write_parts
@@ -26,9 +25,6 @@ HUB_TASKS = ["image-segmentation", "keypoint-detection"]
 """What Hugging Face calls the tasks that the truth is for."""
 HUB_SIZES = {1_000: "n<1K", 10_000: "1K<n<10K", 100_000: "10K<n<100K", 1_000_000: "100K<n<1M"}
 """Number of clips -> what Hugging Face calls fewer."""
-
-
-Croissant = Callable[..., bytes]
 
 
 class ReleaseError(ValueError):
@@ -63,18 +59,13 @@ def release(
     """
     if folder.exists() or folder.is_symlink():
         raise ReleaseError(f"{folder}: is there already: give another folder with --to, or remove it")
-    try:
-        from echotruth.sharing.description.croissant import croissant
-    except ModuleNotFoundError as error:
-        remedy = installation("description")
-        raise DescriptionError(f"release needs the package {error.name}: {remedy}") from None
     facts = read_facts(repository, given or Attribution())
     draft = folder.with_name(f".partial-{folder.name}")
     rmtree(draft, ignore_errors=True)
     draft.mkdir(parents=True)
     try:
         found = write_parts(repository, draft, part_bytes)
-        texts = _documents(facts, found, croissant)
+        texts = _documents(facts, found)
         texts[REGISTRY] = registry(found, texts)
         for name, content in texts.items():
             files.write(draft / name, content)
@@ -85,16 +76,14 @@ def release(
     return [folder / name for name in (*(part.path.name for part in found), *texts)]
 
 
-def _documents(facts: Facts, found: list[Part], croissant: Croissant) -> dict[str, bytes]:
+def _documents(facts: Facts, found: list[Part]) -> dict[str, bytes]:
     """Content of the files beside the parts, by their names."""
-    said, parts = statements(facts), [(part.path.name, part.bytes, part.sha256) for part in found]
+    said = statements(facts)
+    texts = documents(facts, said, [(part.path.name, part.bytes, part.sha256) for part in found])
     hub = yaml.safe_dump(_hub(facts, said), sort_keys=False, allow_unicode=True)
-    return {
-        CLIPS: facts.clips_table,
+    return texts | {
         PARTS: table(found),
-        "README.md": f"---\n{hub}---\n\n".encode() + card(facts, said, is_release=True),
-        "CITATION.cff": citation(facts, said),
-        "croissant.json": croissant(facts, said, parts),
+        "README.md": f"---\n{hub}---\n\n".encode() + texts["README.md"],
         ".zenodo.json": (json.dumps(_zenodo(facts, said), indent=1, ensure_ascii=False) + "\n").encode(),
         "cases.csv": (facts.repository.folder / "cases.csv").read_bytes(),
         "evaluate.py": Path(evaluate.__file__).read_bytes(),
