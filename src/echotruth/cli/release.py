@@ -21,9 +21,8 @@ def release(arguments: argparse.Namespace) -> int:
     """Write the files that one would upload to give a repository away.
 
     These are archives of whole hearts and clips, of a stated size, a registry of their checksums for pooch, a data
-    card that Hugging Face reads, .zenodo.json, Croissant, a citation, the clips as NumPy archives and an
-    evaluator of trackers in one file. echotruth.fetch reads them from wherever they are. It needs the
-    extra description of echotruth.
+    card that Hugging Face reads, .zenodo.json, Croissant and a citation. echotruth.fetch reads them from
+    wherever they are. It needs the extra description of echotruth.
 
     examples:
       echotruth release out/demo --license CC-BY-4.0 --author 'Doe, Jane; 0000-0002-1825-0097'

@@ -77,13 +77,12 @@ def server(released):
 def test_parts_hold_every_file_once_and_are_as_large_as_they_may_be(released, tmp_path):
     parts = sorted(released.glob("*.zip"))
     assert [path.name for path in parts] == [
-        "sample-clips-0001.zip",
         "sample-hearts-0001.zip",
         "sample-hearts-0002.zip",
         "sample-structure.zip",
     ]
     assert all(path.stat().st_size < 1.05 * LIMIT for path in parts)
-    held = [name for path in parts if "clips" not in path.name for name in ZipFile(path).namelist()]
+    held = [name for path in parts for name in ZipFile(path).namelist()]
     assert sorted(held) == sorted(f"sample/{name}" for name in files(et.sample().folder))
     again = write_release(tmp_path / "again")
     assert files(again) == files(released)
@@ -121,7 +120,7 @@ def test_folder_gives_back_the_same_bytes(released, tmp_path):
 
 def test_one_heart_comes_without_the_parts_of_others(server, tmp_path):
     fetched = et.fetch(server.address, cases=["infarct"], to=tmp_path)
-    assert "sample-hearts-0001.zip" not in server.asked and "sample-clips-0001.zip" not in server.asked
+    assert "sample-hearts-0001.zip" not in server.asked
     ours = et.sample().clip("infarct", "mid")
     assert fetched.clip("infarct", "mid").equals(ours)
     with pytest.raises(ValueError, match="healthy"):

@@ -1,4 +1,4 @@
-"""A repository as the files that one would upload: parts with their checksums, a card, metadata and an evaluator."""
+"""A repository as the files that one would upload: parts with their checksums, a card and metadata."""
 
 import json
 from pathlib import Path
@@ -16,7 +16,6 @@ from echotruth.sharing.description.citation import filled
 from echotruth.sharing.description.facts import Facts, read_facts
 from echotruth.sharing.description.statements import statements
 from echotruth.sharing.fetching import PARTS, REGISTRY
-from echotruth.sharing.release import evaluate
 from echotruth.sharing.release.parts import Part, registry, table, write_parts
 
 PART_BYTES = 2 * 10**9
@@ -86,7 +85,6 @@ def _documents(facts: Facts, found: list[Part]) -> dict[str, bytes]:
         "README.md": f"---\n{hub}---\n\n".encode() + texts["README.md"],
         ".zenodo.json": (json.dumps(_zenodo(facts, said), indent=1, ensure_ascii=False) + "\n").encode(),
         "cases.csv": (facts.repository.folder / "cases.csv").read_bytes(),
-        "evaluate.py": Path(evaluate.__file__).read_bytes(),
     }
 
 

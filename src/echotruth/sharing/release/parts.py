@@ -19,10 +19,9 @@ from echotruth.repository.checksums import CHECKSUMS, checksum
 from echotruth.repository.places import DEPTHS
 from echotruth.repository.publication import published_checksums
 from echotruth.repository.reader import Repository
-from echotruth.sharing.release.clips import clips_of
 
-STRUCTURE, HEARTS, CLIPS = "structure", "hearts", "clips"
-"""What a part holds; clips are NumPy archives for whoever reads no Zarr."""
+STRUCTURE, HEARTS = "structure", "hearts"
+"""What a part holds."""
 
 Files = dict[str, bytes | Path]
 """Name in an archive -> content, or the file that has it."""
@@ -36,7 +35,7 @@ class Part:
     ----------
     path : Path
     holds : str
-        One of `STRUCTURE`, `HEARTS` and `CLIPS`.
+        `STRUCTURE` or `HEARTS`.
     cases : list of str
         Cases of which it holds files.
     size : int
@@ -87,8 +86,7 @@ def write_parts(repository: Repository, folder: Path, limit: int) -> list[Part]:
     structure = Part(folder / f"{name}-{STRUCTURE}.zip", STRUCTURE)
     structure.add([], folders.pop(""))
     hearts = filled(folder / f"{name}-{HEARTS}", HEARTS, by_case(repository, folders), limit)
-    clips = filled(folder / f"{name}-{CLIPS}", CLIPS, clip_files(repository), limit)
-    return [structure, *hearts, *clips]
+    return [structure, *hearts]
 
 
 def folders_of(repository: Repository) -> dict[str, Files]:
@@ -111,13 +109,6 @@ def by_case(repository: Repository, folders: dict[str, Files]) -> Iterator[tuple
         for place in (f"hearts/{heart}", *clips, f"inference/{case}"):
             owners.setdefault(place, []).append(str(case))
     yield from ((cases, folders[place]) for place, cases in owners.items() if place in folders)
-
-
-def clip_files(repository: Repository) -> Iterator[tuple[list[str], Files]]:
-    """The archives of the clips of each view."""
-    for case, views in repository.finished(None, None, "mechanics", "truth", "bmode", "points"):
-        for view in views:
-            yield [case.id], {f"clips/{name}": text for name, text in clips_of(repository, case.id, view).items()}
 
 
 def filled(stem: Path, holds: str, folders: Iterable[tuple[list[str], Files]], limit: int) -> list[Part]:
