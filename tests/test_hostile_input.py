@@ -22,7 +22,7 @@ from echotruth.config.tracking import External
 from echotruth.mechanics.geometry import GeometryError, left_ventricle
 from echotruth.mechanics.motion_file.series import read_series
 from echotruth.mechanics.prescribed import MotionError
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 from echotruth.tracking import track
 
 SEED, LONGEST_LINE = 38, 900
@@ -182,7 +182,7 @@ def test_result_of_a_tracker_is_refused_or_of_the_points(tmp_path):
 def test_clip_is_refused_or_an_echo(tmp_path):
     pytest.importorskip("nibabel").Nifti1Image(FILM.T, np.eye(4)).to_filename("clip.nii")
     pytest.importorskip("pydicom")
-    work = Export(et.sample(), Selection(["healthy"], ["mid"]), "dicom", output=tmp_path / "clip.dcm")
+    work = Export(et.sample(), "dicom", cases=["healthy"], views=["mid"], output=tmp_path / "clip.dcm")
     list(work.write(work.clips()[0]))
     np.save("clip.npy", FILM.astype(np.float32))
     first, *others = map(Image.fromarray, FILM)

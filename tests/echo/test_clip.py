@@ -12,14 +12,14 @@ import echotruth as et
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall_file import part
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 
 GIVEN = {"spacing_mm": 0.3, "frame_time_ms": 20.0}
 FILM = np.random.default_rng(1).integers(0, 255, (6, 32, 48), np.uint8)
 
 
 def exported(known, folder, name):
-    work = Export(Repository(known.folder), Selection(["heart"], ["mid"], [SIZES[0]]), name, output=folder)
+    work = Export(Repository(known.folder), name, cases=["heart"], views=["mid"], sizes=[SIZES[0]], output=folder)
     (path,) = work.write(work.clips()[0])
     return path
 

@@ -16,7 +16,7 @@ from echotruth.config.tracking import BUILTIN
 from echotruth.echo import page
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import write_wall
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 
 MIDDLE = (ENDO + EPI) / 2
 
@@ -86,7 +86,7 @@ def test_clip_that_begins_elsewhere_and_does_not_close_is_told(ring):
 def test_closed_cycle_whose_last_frame_is_a_step_before_its_end_is_not_doubted(tmp_path, caplog):
     """The clips of the sample have ten frames, so that a fifth of the motion is left in the last."""
     pytest.importorskip("pydicom")
-    work = Export(et.sample(), Selection(["healthy"], ["mid"]), "dicom", output=tmp_path)
+    work = Export(et.sample(), "dicom", cases=["healthy"], views=["mid"], output=tmp_path)
     (path,) = work.write(work.clips()[0])
     np.save(tmp_path / "wall.npy", et.sample().clip("healthy", "mid")["mask"][0].values)
     clip, wall = et.read_clip(path), et.read_wall(tmp_path / "wall.npy", "mid")

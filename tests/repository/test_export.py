@@ -9,7 +9,7 @@ import xarray as xr
 
 from echotruth.extras import installation
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 
 pytestmark = pytest.mark.slow
 
@@ -28,7 +28,7 @@ def rf(folder):
 
 
 def export(folder, name, case, view, output=None):
-    work = Export(Repository(folder), Selection([case], [view]), name, output=output)
+    work = Export(Repository(folder), name, cases=[case], views=[view], output=output)
     (file,) = work.write(work.clips()[0])
     return file
 

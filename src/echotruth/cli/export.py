@@ -46,12 +46,12 @@ def export(arguments: argparse.Namespace) -> int:
       2  they cannot be exported
     """
     from echotruth.repository.reader import Repository
-    from echotruth.sharing.export import Export, Selection
+    from echotruth.sharing.export import Export
 
-    chosen = Selection(arguments.case, arguments.view, arguments.size, arguments.tracker)
+    chosen = arguments.case, arguments.view, arguments.size, arguments.tracker
     try:
-        options = arguments.format, arguments.overlay, arguments.rate, arguments.output
-        work = Export(Repository(arguments.repository), chosen, *options)
+        how = arguments.overlay, arguments.rate, arguments.output
+        work = Export(Repository(arguments.repository), arguments.format, *chosen, *how)
         clips, left_out = work.clips()
         for path in work.write(clips):
             print(path, flush=True)

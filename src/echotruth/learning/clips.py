@@ -86,7 +86,7 @@ class Clips(Items):
                 raise ValueError(f"classes = {self.classes}: the diagnosis of {case} is {name}: add it, or omit it.")
 
     def item(self, place: Place, within: int) -> Item:
-        found = {name: self.truth(place, name) for name in self.names}
+        found: Item = {name: self.truth(place, name) for name in self.names}
         for name in VECTORS & set(found):
             found[name] = np.ascontiguousarray(np.moveaxis(found[name], -1, -3))
         found |= {name: self._of_heart(place[0], name) for name in self.of_heart}

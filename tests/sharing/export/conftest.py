@@ -6,11 +6,11 @@ import pytest
 from known_repository import SIZES
 
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 
 
 def write(known, folder, name, view="mid", size=SIZES[0], **options):
-    work = Export(Repository(known.folder), Selection(["heart"], [view], [size]), name, output=folder, **options)
+    work = Export(Repository(known.folder), name, cases=["heart"], views=[view], sizes=[size], output=folder, **options)
     (path,) = work.write(work.clips()[0])
     return path
 

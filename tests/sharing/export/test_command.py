@@ -14,7 +14,7 @@ from echotruth.cases import expand
 from echotruth.extras import installation
 from echotruth.repository import metadata
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export, ExportError, Selection, destination, png
+from echotruth.sharing.export import Export, ExportError, destination, png
 
 
 def call(monkeypatch, *arguments):
@@ -125,7 +125,7 @@ def test_failure_half_way_leaves_nothing_new_and_what_was_there(known, monkeypat
         (tmp_path / "reached").touch()
         raise OSError(28, "No space left on device")
 
-    work = Export(Repository(known.folder), Selection(views=["mid"]), "png", output=tmp_path / "out")
+    work = Export(Repository(known.folder), "png", views=["mid"], output=tmp_path / "out")
     (folder,) = work.write(work.clips()[0])
     before = sorted(path.name for path in folder.iterdir())
     monkeypatch.setattr(png, "pictures", fail)

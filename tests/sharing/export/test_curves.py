@@ -6,7 +6,7 @@ import pytest
 from known_repository import FRAMES, SHIFT
 
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 
 
 @pytest.fixture(scope="module")
@@ -63,13 +63,13 @@ def test_trackers_stand_beside_the_truth_in_the_plane_in_both_measures(table):
 
 
 def test_only_chosen_trackers_have_rows(known, tmp_path):
-    work = Export(Repository(known.folder), Selection(views=["mid"], trackers=["two"]), "csv", output=tmp_path)
+    work = Export(Repository(known.folder), "csv", views=["mid"], trackers=["two"], output=tmp_path)
     (file,) = work.write(work.clips()[0])
     assert set(pd.read_csv(file, keep_default_na=False)["tracker"]) == {"", "two"}
 
 
 def test_summary_of_all_clips_stands_beside_their_curves(known, tmp_path):
-    work = Export(Repository(known.folder), Selection(trackers=["two"]), "csv", output=tmp_path)
+    work = Export(Repository(known.folder), "csv", trackers=["two"], output=tmp_path)
     files = list(work.write(work.clips()[0]))
     table = pd.read_csv(tmp_path / "summary.csv")
     assert {file.name for file in files} == {path.name for path in tmp_path.iterdir()} - {"summary.csv"}
@@ -81,6 +81,6 @@ def test_summary_of_all_clips_stands_beside_their_curves(known, tmp_path):
 
 
 def test_one_file_has_no_table_beside_it(known, tmp_path):
-    selection = Selection(views=["mid"], trackers=["two"])
-    work = Export(Repository(known.folder), selection, "csv", output=tmp_path / "mine.csv")
+    chosen = {"views": ["mid"], "trackers": ["two"]}
+    work = Export(Repository(known.folder), "csv", **chosen, output=tmp_path / "mine.csv")
     assert list(work.write(work.clips()[0])) == [tmp_path / "mine.csv"] == list(tmp_path.iterdir())

@@ -9,13 +9,13 @@ from known_repository import FRAMES, SHIFT
 
 from echotruth.heart import SHORT_AXIS
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export, Selection
+from echotruth.sharing.export import Export
 from echotruth.sharing.export.vtk import fibres
 
 
 @pytest.fixture(scope="module")
 def series(known, tmp_path_factory):
-    work = Export(Repository(known.folder), Selection(), "vtk", output=tmp_path_factory.mktemp("vtk"))
+    work = Export(Repository(known.folder), "vtk", output=tmp_path_factory.mktemp("vtk"))
     (folder,) = work.write(work.clips()[0])
     return pyvista.PVDReader(str(folder / "heart.pvd"))
 

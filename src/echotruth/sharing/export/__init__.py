@@ -83,33 +83,18 @@ OVERLAYS = ("wall", "segments", "tissue", "displacement", "scale")
 
 
 @dataclass(frozen=True)
-class Selection:
-    """Choice of cases, views, sizes and trackers.
-
-    Attributes
-    ----------
-    cases, views, trackers : sequence of str
-        Their names; all if empty.
-    sizes : sequence of int
-        Pixels along a side; the largest if empty.
-    """
-
-    cases: Sequence[str] = ()
-    views: Sequence[str] = ()
-    sizes: Sequence[int] = ()
-    trackers: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
 class Export:
     """What is to be written, and where to.
 
     Attributes
     ----------
     repository : Repository
-    selection : Selection
     format : str
         One of :data:`FORMATS`.
+    cases, views, trackers : sequence of str
+        Their names; all if empty.
+    sizes : sequence of int
+        Pixels along a side; the largest if empty.
     overlay : sequence of {"wall", "segments", "tissue", "displacement", "scale"}
         What to draw over the images of mp4, gif and png.
     rate : float
@@ -120,16 +105,18 @@ class Export:
     """
 
     repository: Repository
-    selection: Selection
     format: str
+    cases: Sequence[str] = ()
+    views: Sequence[str] = ()
+    sizes: Sequence[int] = ()
+    trackers: Sequence[str] = ()
     overlay: Sequence[str] = ()
     rate: float | None = None
     output: Path | None = None
 
     def __post_init__(self) -> None:
-        chosen = {name: getattr(self.selection, name) for name in ("views", "sizes", "trackers")}
-        for name, given in {"overlay": self.overlay, "rate": self.rate, **chosen}.items():
-            if given and not FORMATS[self.format].takes(name):
+        for name in ("overlay", "rate", "views", "sizes", "trackers"):
+            if getattr(self, name) and not FORMATS[self.format].takes(name):
                 able = ", ".join(key for key, form in FORMATS.items() if form.takes(name))
                 raise ExportError(f"--{name.removesuffix('s')} does nothing for {self.format}: it is for {able}")
         if self.repository.is_sample and "rf" in FORMATS[self.format].stages:
@@ -141,10 +128,10 @@ class Export:
             raise ExportError(f"--overlay {unknown[0]}: use {', '.join(OVERLAYS)}")
 
     @property
-    def trackers(self) -> list[str]:
+    def _trackers(self) -> list[str]:
         """Names of the chosen trackers; all of the repository's own if none is named."""
-        named, own = self.selection.trackers, list(self.repository.config.tracking.trackers)
-        return chosen("tracker", named, self.repository.trackers if named else own)
+        own = list(self.repository.config.tracking.trackers)
+        return chosen("tracker", self.trackers, self.repository.trackers if self.trackers else own)
 
     def clips(self) -> tuple[list[ExportedClip], list[str]]:
         """What is to be written, and why other things are left out.
@@ -160,16 +147,16 @@ class Export:
                 problems.append(reason)
             else:
                 found.append(clip)
-        if problems and (self.selection.cases or not found):
+        if problems and (self.cases or not found):
             raise ExportError(problems[0])
         return found, problems
 
     def _asked(self, holds: str) -> Iterator[ExportedClip]:
         """The clips, views or hearts that are asked for."""
         cases, views = self.repository.every, self.repository.views
-        sizes = self.selection.sizes or self.repository.sizes[:1]
-        for case in chosen("case", self.selection.cases, cases):
-            for view in [""] if holds == "heart" else chosen("view", self.selection.views, views):
+        sizes = self.sizes or self.repository.sizes[:1]
+        for case in chosen("case", self.cases, cases):
+            for view in [""] if holds == "heart" else chosen("view", self.views, views):
                 for size in chosen("size", sizes, self.repository.sizes) if holds == "clip" else [0]:
                     yield ExportedClip(self.repository, cases[case], view, size)
 
@@ -186,7 +173,7 @@ class Export:
             If a file cannot be written.
         """
         form = FORMATS[self.format]
-        options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self.trackers}
+        options = {"overlay": self.overlay, "rate": self.rate or FRAME_RATE, "trackers": self._trackers}
         for clip, target in zip(clips, self._targets(clips), strict=True):
             with draft(target) as path, _told(clip):
                 # A copy, with which goes what was read.
@@ -194,7 +181,7 @@ class Export:
             yield target
         if form.table and clips and not self._is_file:
             with draft(self._output / form.table) as path, _told(clips[0]):
-                form.writer.write_summary(clips, path, self.trackers)
+                form.writer.write_summary(clips, path, self._trackers)
 
     @property
     def _output(self) -> Path:
@@ -230,4 +217,4 @@ def _told(clip: ExportedClip) -> Iterator[None]:
         raise ExportError(f"{clip.repository.folder} cannot be read at {clip.name}: {remedy} ({said})") from error
 
 
-__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError", "Selection"]
+__all__ = ["FORMATS", "OVERLAYS", "Export", "ExportError"]
