@@ -1,6 +1,5 @@
 """`echotruth info`: what it tells is what is there."""
 
-import os
 import platform
 import re
 import shutil
@@ -34,8 +33,7 @@ def test_installation_is_told(call):
     assert found["echotruth"].startswith(echotruth.__version__) and found["Python"].startswith(
         platform.python_version()
     )
-    assert f"numpy {version('numpy')}" in found["packages"] and f"of {os.cpu_count()}" in found["cores"]
-    assert float(found["disk"].split()[0]) == pytest.approx(shutil.disk_usage(".").free / 2**30, abs=5)
+    assert f"numpy {version('numpy')}" in found["packages"]
 
 
 @pytest.mark.slow

@@ -1,11 +1,10 @@
-"""`echotruth info`: this installation and machine, or a repository at a glance."""
+"""`echotruth info`: this installation, or a repository at a glance."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import platform
-import shutil
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,7 +20,7 @@ GIB = 2**30
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth info`."""
-    text = "folder of a repository, such as out/demo (default: show the installation and the machine)"
+    text = "folder of a repository, such as out/demo (default: show the installation)"
     parser.add_argument("repository", nargs="?", help=text)
 
 
@@ -70,21 +69,13 @@ def _bytes(number: int) -> str:
 
 
 def _installation() -> dict[str, str]:
-    """What is installed, and the machine."""
-    import psutil
-
+    """What is installed."""
     from echotruth.repository.version import packages
 
-    memory = psutil.virtual_memory()
-    disk = shutil.disk_usage(Path.cwd())
-    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "echotruth": f"{echotruth.__version__}, {Path(echotruth.__file__).parent}",
         "Python": f"{platform.python_version()} on {platform.system()} {platform.release()} ({platform.machine()})",
         "packages": ", ".join(f"{name} {version}" for name, version in packages().items() if name != "echotruth"),
-        "cores": f"{usable} of {os.cpu_count()}",
-        "memory": f"{memory.available / GIB:.1f} GiB free of {memory.total / GIB:.1f} GiB",
-        "disk": f"{disk.free / GIB:.1f} GiB free of {disk.total / GIB:.1f} GiB in {Path.cwd()}",
     }
 
 
