@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,20 +53,10 @@ def pictures(clip: ExportedClip, overlay: Sequence[str]) -> Pictures:
     return found
 
 
-def _segments(clip: ExportedClip, frames: Pictures) -> None:
-    """Colour the segments, those of AHA next to each other differently."""
-    _tint(frames, clip.truth("segment")["segment"].values, SEGMENTS)
-
-
-def _tissue(clip: ExportedClip, frames: Pictures) -> None:
-    """Colour the tissues."""
-    _tint(frames, clip.truth("tissue")["tissue"].values, TISSUES)
-
-
-def _tint(frames: Pictures, labels: Pictures, palette: Sequence[str]) -> None:
-    """Lay the colours of the numbers from 1 on over images."""
+def _tint(clip: ExportedClip, frames: Pictures, name: str, palette: Sequence[str]) -> None:
+    """Lay the colours of the numbers from 1 on that a label has at the pixels over images."""
     colours = np.array([(0, 0, 0), *map(ImageColor.getrgb, palette)], float)
-    for frame, numbers in zip(frames, labels, strict=True):
+    for frame, numbers in zip(frames, clip.truth(name)[name].values, strict=True):
         tinted = (1 - OPACITY) * frame + OPACITY * colours[numbers]
         frame[:] = np.where(numbers[..., None] > 0, np.round(tinted), frame)
 
@@ -141,7 +132,11 @@ def _write(frame: Pictures, text: str, corner: tuple[int, int], right: int | Non
         draw.text(_fine(np.array([[column, corner[1]]]))[0], text, 255, font, anchor)
 
 
-DRAWINGS = {"segments": _segments, "tissue": _tissue, "wall": _wall, "displacement": _displacement, "scale": _scale}
+DRAWINGS = {
+    "segments": partial(_tint, name="segment", palette=SEGMENTS),  # those of AHA next to each other differ
+    "tissue": partial(_tint, name="tissue", palette=TISSUES),
+    **{"wall": _wall, "displacement": _displacement, "scale": _scale},
+}
 """Name of an overlay to the function that draws it, those below first."""
 
 

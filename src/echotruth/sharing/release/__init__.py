@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from shutil import rmtree
 from typing import Any
 
 import yaml
@@ -15,6 +14,7 @@ from echotruth.sharing.description.attribution import Attribution
 from echotruth.sharing.description.citation import filled
 from echotruth.sharing.description.facts import Facts, read_facts
 from echotruth.sharing.description.statements import statements
+from echotruth.sharing.export.destination import draft
 from echotruth.sharing.fetching import PARTS, REGISTRY
 from echotruth.sharing.release.parts import Part, registry, table, write_parts
 
@@ -59,19 +59,13 @@ def release(
     if folder.exists() or folder.is_symlink():
         raise ReleaseError(f"{folder}: is there already: give another folder with --to, or remove it")
     facts = read_facts(repository, given or Attribution())
-    draft = folder.with_name(f".partial-{folder.name}")
-    rmtree(draft, ignore_errors=True)
-    draft.mkdir(parents=True)
-    try:
-        found = write_parts(repository, draft, part_bytes)
+    with draft(folder) as path:
+        path.mkdir()
+        found = write_parts(repository, path, part_bytes)
         texts = _documents(facts, found)
         texts[REGISTRY] = registry(found, texts)
         for name, content in texts.items():
-            files.write(draft / name, content)
-        draft.rename(folder)
-    except BaseException:
-        rmtree(draft, ignore_errors=True)
-        raise
+            files.write(path / name, content)
     return [folder / name for name in (*(part.path.name for part in found), *texts)]
 
 
