@@ -1,6 +1,6 @@
 """The truth drawn over B-mode images, on their own pixels, so that the scale stays."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 
@@ -132,7 +132,7 @@ def _write(frame: Pictures, text: str, corner: tuple[int, int], right: int | Non
         draw.text(_fine(np.array([[column, corner[1]]]))[0], text, 255, font, anchor)
 
 
-DRAWINGS = {
+DRAWINGS: dict[str, Callable[[ExportedClip, Pictures], None]] = {
     "segments": partial(_tint, name="segment", palette=SEGMENTS),  # those of AHA next to each other differ
     "tissue": partial(_tint, name="tissue", palette=TISSUES),
     **{"wall": _wall, "displacement": _displacement, "scale": _scale},
