@@ -21,7 +21,7 @@ def release(arguments: argparse.Namespace) -> int:
     """Write the files that one would upload to give a repository away.
 
     These are archives of whole hearts and clips, of a stated size, a registry of their checksums for pooch, a data
-    card that Hugging Face reads, .zenodo.json, Croissant and a citation. echotruth.fetch reads them from
+    card that Hugging Face reads, Croissant and a citation. echotruth.fetch reads them from
     wherever they are. It needs the extra description of echotruth.
 
     examples:

@@ -1,6 +1,5 @@
 """What one would upload: documents that other programs read, parts, and errors in one sentence."""
 
-import json
 import re
 from contextlib import chdir
 from shutil import copytree
@@ -65,21 +64,10 @@ def test_code_of_the_card_runs(tmp_path):
     assert float(abs(names["clip"]["displacement"]).max()) > 1e-4  # m
 
 
-def test_zenodo_is_told_who_what_and_under_which_terms(released):
-    found = json.loads((released / ".zenodo.json").read_text())
-    assert found["creators"][0] == {
-        "name": "Doe, Jane",
-        "orcid": "0000-0002-1825-0097",
-        "affiliation": "Example University",
-    }
-    assert (found["license"], found["version"], found["upload_type"]) == ("cc-by-4.0", "1.2.0", "dataset")
-
-
 def test_terms_that_nobody_chose_are_not_made_up(finished, tmp_path):
     release(et.Repository(finished), tmp_path / "plain")
     head = yaml.safe_load((tmp_path / "plain/README.md").read_text().split("---\n")[1])
     assert "license" not in head
-    assert "license" not in json.loads((tmp_path / "plain/.zenodo.json").read_text())
 
 
 def test_croissant_is_valid_and_its_tables_are_read(released):

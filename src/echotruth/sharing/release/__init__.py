@@ -1,13 +1,11 @@
 """A repository as the files that one would upload: parts with their checksums, a card and metadata."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from echotruth import files
-from echotruth.config import shipped
 from echotruth.repository.reader import Repository
 from echotruth.sharing.description import documents
 from echotruth.sharing.description.attribution import Attribution
@@ -77,7 +75,6 @@ def _documents(facts: Facts, found: list[Part]) -> dict[str, bytes]:
     return texts | {
         PARTS: table(found),
         "README.md": f"---\n{hub}---\n\n".encode() + texts["README.md"],
-        ".zenodo.json": (json.dumps(_zenodo(facts, said), indent=1, ensure_ascii=False) + "\n").encode(),
         "cases.csv": (facts.repository.folder / "cases.csv").read_bytes(),
     }
 
@@ -95,28 +92,6 @@ def _hub(facts: Facts, said: dict[str, Any]) -> dict[str, Any]:
         task_categories=HUB_TASKS,
         size_categories=[next((name for size, name in HUB_SIZES.items() if number < size), "n>1M")],
         configs=[{"config_name": name, "data_files": f"{name}.csv"} for name in ("clips", "cases")],
-    )
-
-
-def _zenodo(facts: Facts, said: dict[str, Any]) -> dict[str, Any]:
-    """What Zenodo asks for of a record."""
-    given, paper = facts.attribution, shipped.citation()["preferred-citation"]
-    people = [
-        filled(name=", ".join(filter(None, [one.family, one.given])), orcid=one.orcid, affiliation=one.affiliation)
-        for one in given.authors
-    ]
-    return filled(
-        title=facts.title,
-        upload_type="dataset",
-        description=said["summary"],
-        creators=people,
-        license=given.spdx.lower(),
-        access_right="open" if given.spdx else "",
-        version=given.release,
-        publication_date=facts.published.isoformat(),
-        language="eng",
-        keywords=said["keywords"],
-        related_identifiers=[{"identifier": paper["doi"], "relation": "cites"}] if paper.get("doi") else [],
     )
 
 
