@@ -49,7 +49,6 @@ WALL += square("endocardium", 15) + square("epicardium", 25)
         (["KNOWN", "--wall", "no.csv", "-o", "no.csv"], "no.csv: is not there: give a wall to be corrected"),
         (["KNOWN", "-o", "wall.png"], "wall.png: cannot hold a wall: give a file of which the name ends in .csv"),
         (["KNOWN", "-o", "bad.csv"], "bad.csv: has no column part"),
-        (["KNOWN", "--port", "99999"], "--port 99999: give a number"),
     ],
 )
 def test_what_cannot_be_drawn_is_told_in_one_line(call, clip, tmp_path, arguments, sentence):
@@ -58,6 +57,12 @@ def test_what_cannot_be_drawn_is_told_in_one_line(call, clip, tmp_path, argument
     words = known + arguments[1:] if arguments[0] == "KNOWN" else arguments
     status, output, errors = call("draw", *words, "--no-browser")
     assert (status, output, errors.count("\n")) == (2, "", 1) and errors.startswith(f"echotruth: {sentence}"), errors
+
+
+@pytest.mark.parametrize("command", ["draw", "show"])
+def test_port_that_there_is_none_of_is_told_in_one_line(call, command):
+    status, output, errors = call(command, "clip.npy", "--port", "99999")
+    assert (status, output, errors.count("\n")) == (2, "", 1) and "--port: 99999: give a number from 1" in errors
 
 
 DRAW = """

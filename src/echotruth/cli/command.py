@@ -89,6 +89,27 @@ def add_repeated(parser: argparse.ArgumentParser, *options: tuple[str, type, str
         parser.add_argument(f"--{name}", type=kind, action="append", default=[], help=text)
 
 
+def add_page(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a command that serves a page."""
+    parser.add_argument("--port", type=_port, default=0, help="port of the page (default: any that is free)")
+    parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+
+
+def show_page(arguments: argparse.Namespace, what: object, address: str) -> None:
+    """Print the address of a page, and open it in the browser unless the options say otherwise."""
+    import webbrowser
+
+    print(f"{what}: {address} (Ctrl-C ends it)", flush=True)
+    if not arguments.no_browser:
+        webbrowser.open(address)
+
+
+def _port(text: str) -> int:
+    if not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text}: give a number from 1 to 65535, or none for any that is free")
+    return int(text)
+
+
 def count(text: str) -> int:
     """Whole number above 0, as an option gives it."""
     if not text.isdigit() or int(text) < 1:

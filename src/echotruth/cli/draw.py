@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from echotruth.cli import recording
-from echotruth.cli.command import fail
+from echotruth.cli.command import add_page, fail, show_page
 from echotruth.echo.wall_file import default_output, part, said
 
 
@@ -16,8 +16,7 @@ def add(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--output", type=Path, metavar="FILE.csv", help=text)
     text = "table or mask of a wall to be corrected (default: the output, if it is there)"
     parser.add_argument("--wall", type=Path, metavar="FILE", help=text)
-    parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
-    parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+    add_page(parser)
 
 
 def draw(arguments: argparse.Namespace) -> int:
@@ -36,12 +35,8 @@ def draw(arguments: argparse.Namespace) -> int:
       0  the page was closed
       2  the clip or the wall cannot be shown
     """
-    if not 0 <= arguments.port <= 65535:
-        return fail(f"--port {arguments.port}: give a number from 1 to 65535, or none for any that is free")
     if names := recording.missing(arguments.clip, arguments):
         return fail(recording.asked(arguments.clip, names))
-    import webbrowser
-
     from echotruth.echo import drawing
 
     output = arguments.output or default_output(arguments.clip)
@@ -54,11 +49,5 @@ def draw(arguments: argparse.Namespace) -> int:
     if finds_sector and (shown := part(clip.attrs["part"])):
         crop = " ".join(map(str, shown.crop))
         print(f"{arguments.clip}: shows what moves in it: --crop {crop}", file=sys.stderr)
-
-    def ready() -> None:
-        print(f"{arguments.clip}: {server.address} (Ctrl-C ends it)", flush=True)
-        if not arguments.no_browser:
-            webbrowser.open(server.address)
-
-    server.run(ready)
+    server.run(lambda: show_page(arguments, arguments.clip, server.address))
     return 0

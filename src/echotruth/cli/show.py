@@ -2,14 +2,13 @@
 
 import argparse
 
-from echotruth.cli.command import fail
+from echotruth.cli.command import add_page, show_page
 
 
 def add(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `echotruth show`."""
     parser.add_argument("repository", help="folder of the repository, such as out/demo, s3://BUCKET/FOLDER, or sample")
-    parser.add_argument("--port", type=int, default=0, help="port of the page (default: any that is free)")
-    parser.add_argument("--no-browser", action="store_true", help="print the address, and open no browser")
+    add_page(parser)
 
 
 def show(arguments: argparse.Namespace) -> int:
@@ -27,19 +26,8 @@ def show(arguments: argparse.Namespace) -> int:
       0  the viewer was closed
       2  it cannot be shown
     """
-    import webbrowser
-
     from echotruth.viewer import server
 
-    if not 0 <= arguments.port <= 65535:
-        return fail(f"--port {arguments.port}: give a number from 1 to 65535, or none for any that is free")
     served = server.serve(arguments.repository, arguments.port)
-
-    def ready() -> None:
-        address = server.address(served)
-        print(f"{arguments.repository}: {address} (Ctrl-C ends it)", flush=True)
-        if not arguments.no_browser:
-            webbrowser.open(address)
-
-    server.run(served, ready)
+    server.run(served, lambda: show_page(arguments, arguments.repository, server.address(served)))
     return 0
