@@ -66,7 +66,7 @@ def _of_file(error: OSError) -> str:
     if error.errno is None:
         return str(error)
     place = f"{error.filename!s:.200}: " if error.filename else ""
-    return f"{place}{error.strerror}: see that the path is right and you may read and write there"
+    return f"{place}{error.strerror}: see that the path is right, has space, and you may read and write there"
 
 
 def _unknown(option: str, command: str, whole: Parser) -> str:

@@ -50,7 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
     exit status:
       0  everything is made
       1  the configuration is not valid, or jobs failed
-      2  an option is wrong, or the images make no sense; --yes runs the latter nevertheless
+      2  an option is wrong, the folder cannot be written, or the images make no sense; --yes runs the latter
+         nevertheless
       4  everything is made, but no heart is complete: each failed or is implausible, and none is imaged
     """
     from echotruth.cli.configuration import load_cases
@@ -76,9 +77,6 @@ def run(arguments: argparse.Namespace) -> int:
         return _make(arguments, config, cases)
     except KeyboardInterrupt:
         sys.exit("echotruth: interrupted; run the same command again to continue")
-    except OSError as error:
-        remedy = "the working folder must be writable and have space"
-        sys.exit(f"echotruth: {error.filename or arguments.config}: {error.strerror or error}: {remedy}")
 
 
 def print_concerns(found: list, is_accepted: bool = False) -> None:
