@@ -182,7 +182,7 @@ def test_file_in_the_place_of_the_folder_is_told_in_one_line(tmp_path):
     (tmp_path / "tiny.yaml").write_text("name: tiny")
     (tmp_path / "out").write_text("")
     status, output, errors = run_cli("run", "tiny.yaml", cwd=tmp_path)
-    assert status == 1 and not output and errors.count("\n") == 1 and "out/tiny" in errors, errors
+    assert status == 2 and not output and errors.count("\n") == 1 and "out/tiny" in errors, errors
 
 
 def mounted(folder: Path) -> None:
@@ -200,4 +200,4 @@ def test_folder_that_cannot_be_written_is_told_in_one_line(tmp_path):
         status, output, errors = run_cli("run", tmp_path / "tiny.yaml", cwd=tmp_path / "read_only")
     finally:
         subprocess.run(["umount", str(tmp_path / "read_only")], check=True)
-    assert status == 1 and not output and errors.count("\n") == 1 and "Read-only file system" in errors
+    assert status == 2 and not output and errors.count("\n") == 1 and "Read-only file system" in errors
