@@ -22,9 +22,10 @@ rule report:
         f"{OUT}/benchmarks/report.tsv"
     group:
         "report"
+    threads: 2
     resources:
         **PLAN.resources("report"),
     conda:
         "../environment.yml"
     shell:
-        f'python "$SCRIPTS/report.py" {OUT} &> {{log}}'
+        f'python "$SCRIPTS/report.py" {OUT} --threads {{threads}} &> {{log}}'

@@ -7,7 +7,7 @@ from finished_repository import begin, configured, finish
 
 from echotruth.config import Cases, Physiology
 from echotruth.report import population
-from echotruth.report.figures import NAMES, Figures
+from echotruth.report.figures import OF_HEARTS, OF_TRACKERS, Figures
 from echotruth.repository.reader import Repository
 
 
@@ -31,10 +31,11 @@ def test_implausible_hearts_are_shown_where_there_are_no_others_and_they_were_im
     assert read.shown == [cases[1]]
 
 
-def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path):
+@pytest.mark.parametrize("threads", [1, 2])
+def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path, threads):
     drawn = Figures(repository(tmp_path, ["failed", "implausible"], exclude=True)[0], tmp_path)
-    drawn.draw()
-    names = set(NAMES)
+    drawn.draw(threads)
+    names = {*OF_HEARTS, *OF_TRACKERS}
     assert {path.stem for path in tmp_path.glob("*.png")} == {path.stem for path in tmp_path.glob("*.svg")} == names
     assert {path.name for path in tmp_path.glob("*.[gmc]*")} == {"clip.gif", "clip.mp4", "leaderboard.csv"}
 

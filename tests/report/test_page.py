@@ -15,7 +15,7 @@ from reported_repository import report
 from shown_repository import SHIFT
 
 from echotruth.report import page, style
-from echotruth.report.figures import NAMES, Figures
+from echotruth.report.figures import OF_HEARTS, OF_TRACKERS, Figures
 from echotruth.repository import metadata
 from echotruth.repository.reader import Repository
 
@@ -153,7 +153,7 @@ def test_many_hearts_are_listed_with_their_number_and_one_view_is_enough(reporte
     views = {"long": SETTINGS["views"]["long"]}
     made = make(tmp_path / "known", SETTINGS | {"views": views, "cases": {"seed": [1, 2]}})
     figures = Figures(Repository(made.folder), shutil.copytree(reported.folder / "figures", made.folder / "figures"))
-    drawn = {name: getattr(figures, name)() for name in NAMES}
+    drawn = {name: getattr(figures, name)() for name in (*OF_HEARTS, *OF_TRACKERS)}
     for name in ("population", "views"):
         style.save(drawn[name], figures.folder / name)
     elements = Elements(page.write(figures.repository).read_text(encoding="utf-8"))

@@ -10,10 +10,11 @@ from echotruth.repository.reader import Repository
 
 parser = argparse.ArgumentParser(description=__doc__)
 parser.add_argument("repository", type=Path, help="folder of the repository, such as out/demo")
-folder = parser.parse_args().repository
+parser.add_argument("--threads", type=int, default=1, help="processes that draw")
+arguments = parser.parse_args()
 try:
-    repository = Repository(folder)
-    Figures(repository, repository.folder / "figures").draw()
+    repository = Repository(arguments.repository)
+    Figures(repository, repository.folder / "figures").draw(arguments.threads)
     page.write(repository)
 except OSError as error:
     sys.exit(f"report: {error}")

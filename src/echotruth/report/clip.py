@@ -216,6 +216,23 @@ def round_length(side: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= side / 5))
 
 
+def smaller(frames: np.ndarray, height: int) -> np.ndarray:
+    """Frames of a smaller height, px.
+
+    Parameters
+    ----------
+    frames : ndarray of shape (frame, height, width, 3), uint8
+        RGB.
+    height : int
+
+    Returns
+    -------
+    ndarray of shape (frame, height, width, 3), uint8
+    """
+    size = round(frames.shape[2] * height / frames.shape[1]), height
+    return np.stack([Image.fromarray(frame).resize(size, Image.Resampling.LANCZOS) for frame in frames])
+
+
 def gif(path: Path, frames: np.ndarray) -> Path:
     """Write a looping GIF with as many colours as its size allows.
 
@@ -274,7 +291,13 @@ def mp4(path: Path, frames: np.ndarray) -> Path:
 
     size = frames.shape[2], frames.shape[1]
     video = imageio_ffmpeg.write_frames(
-        str(path), size, fps=FRAME_RATE, codec="libx264", pix_fmt_out="yuv420p", quality=6, macro_block_size=2
+        str(path),
+        size,
+        fps=FRAME_RATE,
+        codec="libx264",
+        quality=6,
+        macro_block_size=2,
+        output_params=["-preset", "veryfast"],  # half the time of the default for 2 % more bytes
     )
     video.send(None)
     for frame in np.concatenate([frames] * BEATS):

@@ -1,5 +1,7 @@
 """All figures of a repository, drawn from its store."""
 
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -38,11 +40,11 @@ from echotruth.repository.choice import main_view
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS, observations
 
-NAMES = (
-    *("loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"),
-    *("heart", "clip", "views"),
-)
-"""Figures, in the order in which they are drawn."""
+OF_HEARTS = ("clip", "loop", "strain", "physiology", "population", "heart", "views")
+"""Figures of hearts and of their images."""
+
+OF_TRACKERS = ("curves", "segments", "bullseye", "error", "leaderboard")
+"""Figures of what trackers found."""
 
 GIF_HEIGHT, VIDEO_HEIGHT = 300, 720
 """Of the clip, px."""
@@ -69,21 +71,35 @@ class Figures:
         self.case = repository.shown[0] if repository.shown else ""
         self.sizes, self.view = repository.sizes, main_view(self.config)
 
-    def draw(self) -> None:
+    def draw(self, threads: int = 1) -> None:
         """Draw all figures, and write the leaderboard, and what was inferred, as tables.
 
         If no heart is complete, a sentence stands in place of every figure.
+
+        Parameters
+        ----------
+        threads : int
+            With several, those of trackers are drawn by a process of their own.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        infers = self.config.inference.tracker is not None
-        if infers:
+        if threads > 1:
+            with ProcessPoolExecutor(1) as other:
+                drawn = other.submit(self._save, OF_TRACKERS)
+                self._save(OF_HEARTS)
+                drawn.result()
+        else:
+            self._save((*OF_HEARTS, *OF_TRACKERS))
+        if self.config.inference.tracker:
             inferred.write(self.repository.folder / inferred.FILE, self.inferred)
-        for name in (*NAMES, "inference") if infers else NAMES:
+            self._save(("inference",))
+        if not self.case:
+            self._without_hearts()
+
+    def _save(self, names: Iterable[str]) -> None:
+        for name in names:
             figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
-        if not self.case:
-            self._without_hearts()
 
     def _without_hearts(self) -> None:
         """What else is written, without a heart: an empty table, and clips of the sentence."""
@@ -143,8 +159,9 @@ class Figures:
 
     def clip(self) -> None:
         """The clip beside its truth, as a GIF and as a video."""
-        clip.gif(self.folder / "clip.gif", self.frames(GIF_HEIGHT))
-        clip.mp4(self.folder / "clip.mp4", self.frames(VIDEO_HEIGHT))
+        frames = self.frames(VIDEO_HEIGHT)
+        clip.gif(self.folder / "clip.gif", clip.smaller(frames, GIF_HEIGHT))
+        clip.mp4(self.folder / "clip.mp4", frames)
 
     def frames(self, height: int) -> NDArray[np.uint8]:
         """Frames of the clip beside its truth, of a height, px."""

@@ -56,20 +56,22 @@ def draw(cells: np.ndarray, nodes: np.ndarray, fibre: np.ndarray, helix: np.ndar
     figure = style.figure(8.6, 4.2)
     projection = {"projection": "3d", "computed_zorder": False}
     panels = figure.subplots(1, 1 + len(STRAINS), squeeze=False, subplot_kw=projection)[0]
-    wall = _cut(_grid(nodes[0], cells, {"helix": np.degrees(helix)}))
-    add(panels[0], wall, GROUND * angle.to_rgba(wall.point_data["helix"])[:, :3])
-    rods = _rods(nodes[0], fibre, cells, helix)
-    add(panels[0], rods, angle.to_rgba(rods.point_data["helix"])[:, :3])
-    panels[0].set_title("Fibres at end-diastole", y=1.12)
-    for panel, number in zip(panels[1:], STRAINS.values(), strict=True):
-        wall = _cut(_grid(nodes[1], cells, {"strain": 100 * strain[:, number]}))
-        add(panel, wall, percent.to_rgba(wall.point_data["strain"])[:, :3])
-        panel.set_title("End-systole", y=1.12)
+    for panel, title in zip(panels, ("Fibres at end-diastole", "End-systole", "End-systole"), strict=True):
+        panel.set_title(title, y=1.12)
     show(panels, np.concatenate(nodes))
     bar: dict[str, Any] = {"orientation": "horizontal", "shrink": 0.8, "pad": 0.12, "aspect": 22}
     names = ("Helix angle (°)", *(style.QUANTITIES[name].label for name in STRAINS))
     for panel, scale, name in zip(panels, (angle, percent, percent), names, strict=True):
         figure.colorbar(scale, ax=panel, **bar).set_label(name)
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # which would draw all triangles once more to find no room for them
+    wall = _cut(_grid(nodes[0], cells, {"helix": np.degrees(helix)}))
+    add(panels[0], wall, GROUND * angle.to_rgba(wall.point_data["helix"])[:, :3])
+    rods = _rods(nodes[0], fibre, cells, helix)
+    add(panels[0], rods, angle.to_rgba(rods.point_data["helix"])[:, :3])
+    for panel, number in zip(panels[1:], STRAINS.values(), strict=True):
+        wall = _cut(_grid(nodes[1], cells, {"strain": 100 * strain[:, number]}))
+        add(panel, wall, percent.to_rgba(wall.point_data["strain"])[:, :3])
     return figure
 
 
@@ -85,7 +87,7 @@ def _cut(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
     inferior_septal = grid.clip("-y", origin=(0, 0, 0), invert=False).clip("-x", origin=(0, 0, 0))
     remaining = grid.clip("-y", origin=(0, 0, 0)) + inferior_septal
     surface = remaining.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=2).triangulate()
-    return surface.subdivide_adaptive(max_edge_len=surface.length / 40)  # small triangles can be sorted by their depth
+    return surface.subdivide_adaptive(max_edge_len=surface.length / 32)  # small triangles can be sorted by their depth
 
 
 def _rods(nodes: np.ndarray, fibre: np.ndarray, cells: np.ndarray, helix: np.ndarray) -> pyvista.PolyData:

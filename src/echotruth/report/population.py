@@ -35,6 +35,7 @@ def draw(measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Figure:
         for place, name in enumerate(names):
             _finding(panel, values[has[name] & np.isfinite(values)], place)
         panel.set_xlabel(label)
+        panel.locator_params(axis="x", nbins=4)
         panel.grid(axis="y", visible=False)
         panel.margins(x=0.08)
     labels = [f"{name.replace('_', ' ')} ({np.count_nonzero(has[name])})" for name in names]
