@@ -3,8 +3,7 @@
     echotruth run config/fimh25.yaml
     echotruth run config/paper.yaml
     echotruth run default.yaml  # no keys but the name and `tracking.trackers` of config/paper.yaml
-    echotruth run realistic.yaml  # the same with `realism.preset: mouse`
-    python benchmarks/paper.py --authors out/fimh25 --printed out/paper --default out/default --realistic out/realistic
+    python benchmarks/paper.py --authors out/fimh25 --printed out/paper --default out/default
 
 `--otherwise "in the plane=out/FOLDER"` adds a column to the table of corrections, for the authors' heart run with
 `phantom.in_plane_only: true`.
@@ -25,7 +24,7 @@ from paper_figures import Hearts, draw_figures, draw_geometry
 from paper_heart import SLICES, Heart, least_strain, tube_ejection_fraction, tube_strain
 
 RESULTS = Path(__file__).parent / "results"
-TEXT = Path(__file__).parent / "paper_text.md"
+TEXT = Path(__file__).parent / "paper.md.template"
 """The page without its numbers."""
 
 AS_PRINTED = "as_published"
@@ -47,7 +46,6 @@ NAMES = {
     "authors": "authors' heart",
     "printed": "paper's heart",
     "default": "default heart",
-    "realistic": "default heart, realistic images",
 }
 
 ALONE = {"from frame to frame": {"reference": "previous"}, "tapered": {"taper": "hann"}}

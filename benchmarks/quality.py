@@ -44,7 +44,7 @@ SURE = 1e-6
 
 @dataclass(frozen=True)
 class Sample:
-    """What a tracker tells of the points of a clip, and whether they are near their true places.
+    """What a tracker says of the points of a clip, and whether they are near their true places.
 
     `clip` is the species, the view, the size and whether there is noise.
     """

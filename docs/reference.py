@@ -20,16 +20,15 @@ from pydantic_core import PydanticUndefined
 from echotruth.config import Config
 from echotruth.repository import schema
 from echotruth.repository.array import Array
-from echotruth.section import discriminator, docstrings, section_in, unit_of, variants
+from echotruth.section import discriminator, docstrings, section_in, variants
 
 _CONFIG_HEAD = """# Configuration
 
 A configuration is a YAML file. A key that it leaves out has the default that is listed here; a
-key without a default must be given where its section is used. Unknown keys and invalid values
-are refused before anything runs. With `schema.json` in this folder,
-editors complete and check the YAML. The keys carry their units. The path in `cases.file` is from
-the folder of the configuration that names it; all others are from the folder in which the command
-is run.
+key without a default must be given where its section is used. Units are part of the keys (`per_s` is
+1/s). Unknown keys and invalid values are refused before anything runs. With `schema.json` in this
+folder, editors complete and check the YAML. The path in `cases.file` is from the folder of the
+configuration that names it; all others are from the folder in which the command is run.
 
 This page is generated from `src/echotruth/config` by `make reference`.
 
@@ -69,20 +68,18 @@ Files beside it, in `out/NAME`: `config.yaml`, `cases.csv` (the cases with statu
 (settings of the trackers that `echotruth evaluate` added).
 
 - **Attributes of a group:** `status` (complete; failed: the heart has no solution; skipped: the heart is not
-  imaged), `reason` (why it is not complete; then it has no arrays), `version`, a hash of the settings and the code
-  that it was made with, and `checksums`, the SHA-256 of its files. A heart has `bounded` (its measures that have
-  bounds in the section `physiology`), and a tracker `settings` and `failures` (image size -> why it failed). The root
-  has title, summary, references, config (the whole configuration), seed and packages (their versions).
+  imaged), `reason` (why it is not complete; then it has no arrays), `version` (a hash of the settings and the code
+  that made it), and `checksums` (the SHA-256 of its files). A heart has `bounded` (its measures that have bounds), and
+  a tracker `settings` and `failures` (image size -> why it failed). The root has title, summary, references, config
+  (the whole configuration), seed and packages (their versions).
 - **Consolidated metadata** of all that is below are in the root (of up to 50 000 groups and arrays), and in each heart
-  and clip.
-- **Coordinates** lie beside the arrays that have their dimensions.
+  and clip. **Coordinates** lie beside the arrays that have their dimensions.
 - **Chunks.** An array is one shard, and a chunk is one component of one frame (of what was tracked: of the whole
   cycle) with a crc32c checksum. Small arrays are one chunk. Numbers are compressed by Blosc (zstd, bytes shuffled).
 - **Missing values** are `nan`, 0 or "": outside the wall, and where a tracker has no estimate.
-- **Steps.** Arrays with a step hold ordinary numbers rounded to multiples of it, so that they take less room. They
-  are off by half a step at most, and the attribute `quantum` has the step in the unit of the array. `pixel/256` is
-  the largest power of two, in metres, not above 1/256 pixel of the largest image. Scores are computed from the
-  rounded numbers.
+- **Steps.** Arrays with a step hold ordinary numbers rounded to multiples of it, the attribute `quantum` in the unit of
+  the array. `pixel/256` is the largest power of two, in metres, not above 1/256 pixel of the largest image. Scores are
+  computed from the rounded numbers.
 
 Axes, signs and reference states are in `conventions.md`.
 
@@ -111,7 +108,7 @@ and segment.
 
 
 def config_page() -> str:
-    """Page of the configuration keys: unit, default and meaning of each."""
+    """Page of the configuration keys: default and meaning of each."""
     return _CONFIG_HEAD + "\n".join(_section(Config, "", "Top level"))
 
 
@@ -134,18 +131,17 @@ def files() -> dict[str, str]:
 
 def _arrays(arrays: Iterable[Array]) -> list[str]:
     rows = [
-        f"| `{array.name}` | {', '.join(array.dims)} | {array.dtype} | {array.units} | {_step(array)} "
+        f"| `{array.name}` | {', '.join(array.dims)} | {array.dtype}{_step(array)} | {array.units} "
         f"| {array.long_name} |"
         for array in arrays
     ]
-    return ["| array | dimensions | type | units | step | meaning |", "|---|---|---|---|---|---|", *rows, ""]
+    return ["| array | dimensions | type (step) | units | meaning |", "|---|---|---|---|---|", *rows, ""]
 
 
 def _step(array: Array) -> str:
-    """Step of the numbers of an array; empty if they are not rounded."""
-    if isinstance(array.quantum, float):
-        return f"2^{round(log2(array.quantum))}"
-    return array.quantum or ""
+    """Step of the numbers of an array, in brackets; empty if they are not rounded."""
+    step = f"2^{round(log2(array.quantum))}" if isinstance(array.quantum, float) else array.quantum
+    return f" ({step})" if step else ""
 
 
 def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -> list[str]:
@@ -164,17 +160,12 @@ def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -
             continue
         subsection = None if sections else section_in(field.annotation)
         if subsection is None or mapping:
-            rows.append(f"| `{prefix}{key}` | {_unit(key)} | {_default(field)} | {_meaning(model, key)} |")
+            rows.append(f"| `{prefix}{key}` | {_default(field)} | {_meaning(model, key)} |")
         if subsection is not None:
             subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else _meaning(model, key))
     if rows:
-        lines += ["| key | unit | default | meaning |", "|---|---|---|---|", *rows, ""]
+        lines += ["| key | default | meaning |", "|---|---|---|", *rows, ""]
     return [*lines, *subsections]
-
-
-def _unit(key: str) -> str:
-    """Unit of a key as people write it; empty if it has none."""
-    return unit_of(key).replace("_per_", "/").replace("per_", "1/")
 
 
 def _meaning(model: type[BaseModel], key: str) -> str:

@@ -18,7 +18,7 @@ _HEAD = """# What was checked, against what
 
 Numbers of `python -m validation` (`make validation`), which writes this page. "Allowed" is the largest difference from
 what was expected, where a number is judged; one beyond it says **missed**. Beside these, `tests/` checks each stage
-by itself, and [tracking.md](tracking.md) tells how the paper's tracker fares.
+by itself, and [tracking.md](tracking.md) says how the paper's tracker fares.
 
 """
 

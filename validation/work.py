@@ -185,8 +185,8 @@ def _right_cauchy_green(f: Floats) -> Floats:
 def report(results: Results) -> Report:
     """Rows of the page."""
     blood, passive, active, volumetric, viscous, surroundings = results.loop * 1e6
-    source = "virtual work, with independently implemented energies"
-    exact = "a closed loop of an elastic energy; what is left is the step of the frames"
+    source = "virtual work"
+    exact = "a closed loop of an elastic energy"
     by_wall, allowed = -1e6 * float(results.loop[1:].sum()), abs(blood)
     loop = "work on the blood over the beat, and that of all stresses (uJ)"
     name = f"imbalance of a frame, {results.cells} cells, over the largest work"
@@ -202,7 +202,8 @@ def report(results: Results) -> Report:
     text = (
         "At every frame the motion from the frame before to the frame after is taken as a virtual one: the cavity "
         "pressure must do the work that passive, active, volumetric and viscous stress and the pericardium take up. "
-        "Each stress is the rate of an energy, by a complex step."
+        "Each stress is the rate of an independently implemented energy, by a complex step. What is left of a closed "
+        "loop is the step of the frames."
     )
     caption = "Work for the motion about each frame: of the blood (line) and of the stresses of the wall (bars)."
     return Report("Work of blood and wall", text, rows, caption)

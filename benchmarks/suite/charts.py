@@ -15,7 +15,7 @@ from echotruth.report import style
 from .power import FOUND, Power
 
 DRAWN = len(style.SERIES)
-"""Largest number of trackers in a figure whose colours tell them apart."""
+"""Largest number of trackers in a figure whose colours can be distinguished."""
 
 
 @style.styled
@@ -57,7 +57,7 @@ def draw_ratios(path: Path, boards: dict[int, pd.DataFrame]) -> Path:
 
 @style.styled
 def draw_power(path: Path, found: dict[str, Power]) -> Path:
-    """Draw the probability that a tracker is told from another one over the difference of their errors.
+    """Draw the probability that a tracker is distinguished from another one over the difference of their errors.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ A segment with a scar in a part of it shortens a little less than the same segme
 the ROC curve is the probability that it has the higher strain, equal ones counting half (Mann-Whitney; Hanley & McNeil,
 Radiology 1982; 143:29, doi 10.1148/radiology.143.1.7063747). It needs no threshold of strain. Hearts differ, so that
 true strain does not find all of them either. It is no ceiling: a tracker that smooths draws a segment at the border of
-a scar towards its neighbour in it, whose strain tells more.
+a scar towards its neighbour in it, whose strain shows more.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ SUBTLE = 0.5
 """Share of the tissue of a segment up to which its infarct is subtle."""
 
 STRAIN = "peak_percent"
-"""Strain by which segments are told apart: the largest shortening."""
+"""Strain by which segments are distinguished: the largest shortening."""
 
 CLIP = ["heart", "case", "view", "size_px", "tracker"]
 

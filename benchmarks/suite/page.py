@@ -134,7 +134,7 @@ class Page:
             if name not in table.index:
                 return NONE
             row = table.loc[name]
-            words = "worse" if row["low"] > 1 else "better" if row["high"] < 1 else "not told apart"
+            words = "worse" if row["low"] > 1 else "better" if row["high"] < 1 else "undecided"
             return f"{number(row['score'])}; " + (f"{interval(row, 2)}, {words}" if name != REFERENCE else "reference")
 
         return self._table("NRMSE (%); ratio", {f"{size} px": table for size, table in found.items()}, verdict)

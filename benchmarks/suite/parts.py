@@ -58,7 +58,7 @@ def make_part(part: int, jobs: int = 1, trackers: Path | None = None, say: Calla
         YAML file of further trackers by name, as `tracking.trackers` has them, whose scores are put beside the part,
         which must be there. Default: the trackers of the suite.
     say : callable
-        Is told how far it is.
+        Receives how far it is.
 
     Returns
     -------

@@ -43,12 +43,12 @@ class Power(NamedTuple):
         return float(np.mean(((self.low > 0) | (self.high < 0)).any(axis=1)))
 
     def of(self, less: float) -> float:
-        """Probability that a tracker is told from one whose score it undercuts by a share, as 0.1."""
+        """Probability that a tracker is distinguished from one whose score it undercuts by a share, as 0.1."""
         return float(np.mean(self.low > np.log1p(-less)))
 
     @property
     def least(self) -> float:
-        """Share less that is told with the probability `FOUND`."""
+        """Share less that is found with the probability `FOUND`."""
         return float(1 - np.exp(np.quantile(self.low, 1 - FOUND)))
 
 

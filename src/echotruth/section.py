@@ -75,7 +75,7 @@ _CHECK = "is_check"
 
 
 def check(method: Check) -> Check:
-    """Mark a method of a section that raises :func:`invalid` if its keys conflict; all that fail are told at once."""
+    """Mark a method of a section that raises :func:`invalid` if its keys conflict; all that fail are shown at once."""
     setattr(method, _CHECK, True)
     return method
 

@@ -16,7 +16,7 @@ Act = Callable[[argparse.Namespace], int]
 
 
 class Parser(argparse.ArgumentParser):
-    """Parser that tells an error in one line, with what was probably meant."""
+    """Parser that prints an error in one line, with what was probably meant."""
 
     def error(self, message: str) -> NoReturn:
         """Tell an error and end the process with status 2."""

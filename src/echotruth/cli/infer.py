@@ -22,7 +22,7 @@ def infer(arguments: argparse.Namespace) -> int:
     """Infer the contractility of segments, with intervals, from what a tracker saw of the hearts of a repository.
 
     The table has a row for each heart and parameter: mean, standard deviation and 90 % interval, those of the prior,
-    whether the observations tell anything of it, the probability of a scar, and its true value. A heart takes one to
+    whether it is identifiable, the probability of a scar, and its true value. A heart takes one to
     four minutes; the key inference.tracker makes it a stage of a run, which keeps the draws and does nothing twice.
 
     examples:
@@ -31,7 +31,7 @@ def infer(arguments: argparse.Namespace) -> int:
 
     exit status:
       0  all hearts are inferred
-      1  some are not: each is told
+      1  some are not: each is named
       2  none is, or an option is wrong
     """
     from echotruth.inference.stored import rows

@@ -52,7 +52,7 @@ def track(arguments: argparse.Namespace) -> int:
 
     exit status:
       0  all clips are tracked
-      1  some are not: each is told
+      1  some are not: each is named
       2  none is, or an option is wrong
     """
     clips: list[Path] = arguments.clip

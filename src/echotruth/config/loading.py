@@ -89,7 +89,7 @@ def _without_empty(values: Any, model: type[BaseModel]) -> Any:
 
 
 def _distinct(errors: list[ErrorDetails]) -> list[ErrorDetails]:
-    """One error of each value: pydantic tells one for each type that it may have."""
+    """One error of each value: pydantic gives one for each type that it may have."""
     found: dict[Any, ErrorDetails] = {}
     for number, error in enumerate(errors):
         found.setdefault(number if error["type"] == "invalid" else tuple(_without_type(error["loc"])), error)

@@ -10,33 +10,29 @@ from echotruth.section import Angle, Fraction, Positive, Section, check, invalid
 class Physiology(Section):
     """Bounds on a solved heart; a heart outside is kept and marked with the reason. `null` switches a bound off.
 
-    Defaults are those of healthy mice and rats, and enclose with a margin what the named sources measured; `human` has
-    others where people were measured to differ. In a heart that is not `healthy` in cases.csv, those from
-    `edp_min_mmHg` on, and of the ejection fraction, are by default those of its diagnosis (docs/physiology.md).
+    Defaults enclose, with a margin, what the named sources measured in healthy mice and rats; `human` and `rat` give
+    others. A heart that is not `healthy` in cases.csv has the bounds of its diagnosis (docs/physiology.md) for the
+    ejection fraction and for all keys from `edp_min_mmHg` on.
     """
 
     exclude_implausible: bool = True
-    """Do not image and track a heart outside the bounds; `false` images and tracks it. In both cases it is marked
-    `implausible`, and figures and scores include it only if no heart is within the bounds."""
+    """Do not image and track a heart outside the bounds. It is marked `implausible` in any case, and figures and scores
+    include it only if no heart is within the bounds."""
     longitudinal_strain_max: FiniteFloat | None = 0.0
     """Largest wall-mean longitudinal strain at end-systole. Hearts shorten: -0.18 in mice (Zhong 2011, doi
-    10.1186/1532-429X-13-83); with the wrong fibres, an incompressible wall may lengthen instead."""
+    10.1186/1532-429X-13-83)."""
     twist_max_deg: Annotated[FiniteFloat, Field(gt=0)] | None = 40.0
     """Largest rotation of the apex relative to the base in any frame, in either direction. Three times the 13 deg of
     healthy hearts (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Fraction | None = 0.2
-    """Smallest det F at any point in any frame. Lower values mean that elements nearly collapse, whereas myocardium
-    hardly changes its volume; the default heart has 0.93."""
+    """Smallest det F at any point in any frame: elements below it nearly collapse. The default heart has 0.93."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between prescribed and solved pressure or volume in any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0
-    """Smallest active tension in any frame. Muscle does not push, but solving for a loop may give slightly negative
-    values."""
+    """Smallest active tension in any frame; solving for a loop may give slightly negative values."""
     tension_variation_max: Annotated[FiniteFloat, Field(ge=1)] | None = 1.5
     """Largest total variation of the active tension around the cycle, over that of one rise and one fall of the same
-    height. Muscle contracts once in a beat: hearts of mice, rats and people, infarcted, late and thick ones too, have
-    1.00 to 1.05. Where it is larger, the tension that meets the loop oscillates from frame to frame, and with it the
-    motion."""
+    height: 1.00 to 1.05 in healthy and diseased hearts. A larger one oscillates from frame to frame."""
     tension_es_min_kPa: FiniteFloat | None = 20.0
     """Smallest active tension at end-systole; the default mouse has 61, and its largest is 95."""
     tension_es_max_kPa: FiniteFloat | None = 180.0
@@ -54,11 +50,10 @@ class Physiology(Section):
     """Largest end-diastolic pressure; `human` 14, because it is 5 to 12 in people with a normal and 13 to 38 in those
     with a diseased ventricle ("Evaluation of Pulmonary Arterial End-Diastolic Pressure", 50 people)."""
     edv_of_healthy_min: Positive | None = 0.95
-    """Smallest end-diastolic volume over that of the loop, which the heart without its disease has: no disease here
-    empties a ventricle but loss of blood. Hearts whose loop prescribes no volume have none, nor those of a given
-    stiffness, which then sets what the healthy heart holds."""
+    """Smallest end-diastolic volume over that of the loop, which is the healthy heart's: no disease here empties a
+    ventricle but loss of blood. Not checked without a volume loop, or if the stiffness is given."""
     edv_per_mass_min_mL_per_g: Positive | None = 0.3
-    """Smallest end-diastolic volume over the mass of the wall, of a density of 1.05 g/mL: 59.9 +- 8.8 uL over 81.9 +-
+    """Smallest end-diastolic volume over the mass of the wall (density 1.05 g/mL): 59.9 +- 8.8 uL over 81.9 +-
     9.7 mg in mice (doi 10.1186/1476-7120-11-12); conductance finds 25 to 53 uL (Pacher 2008). `human` 0.9."""
     edv_per_mass_max_mL_per_g: Positive | None = 1.2
     """Largest end-diastolic volume over the mass of the wall; `human` 2.8: some 80 over 53 +- 9 g/m2 in men, 75 over 42
@@ -76,9 +71,9 @@ class Physiology(Section):
     """Largest mass of the wall, grown ones too. `rat` 2, `human` 350: 53 +- 9 g/m2 in men (Petersen 2017), and twice
     that in disease."""
     twist_ivc_min_deg: Angle | None = -8.0
-    """Smallest twist at the end of isovolumic contraction, counter-clockwise seen from the apex. Base and apex turn
-    together before ejection, so that it is near 0 (Young & Cowan 2012); in children the twist early in systole is
-    -8.4 to -0.1 deg (doi 10.4070/kcj.2015.45.2.131)."""
+    """Smallest twist at the end of isovolumic contraction, counter-clockwise seen from the apex. It is near 0, as base
+    and apex turn together (Young & Cowan 2012); -8.4 to -0.1 deg early in systole in children (doi
+    10.4070/kcj.2015.45.2.131)."""
     twist_ivc_max_deg: Angle | None = 8.0
     """Largest twist at the end of isovolumic contraction."""
     twist_es_min_deg: Angle | None = 0.0
@@ -88,16 +83,15 @@ class Physiology(Section):
     """Largest twist at end-systole; `human` 25, because it is 18.6 +- 3.1 deg in people over 65 by 3-D speckle tracking
     (PubMed 23887954)."""
     radial_strain_ivc_max: FiniteFloat | None = 0.12
-    """Largest wall-mean radial strain at the end of isovolumic contraction, which is no thickening but the square of
-    transmural shear, because the volume of the cavity has not changed; at end-systole it is 0.29 (Zhong 2011)."""
+    """Largest wall-mean radial strain at the end of isovolumic contraction. At constant volume it is the square of
+    transmural shear; at end-systole it is 0.29 (Zhong 2011)."""
     transmural_shear_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.12
-    """Largest mean of E_RC or E_RL over a layer, in either direction, at the end of isovolumic contraction. E_RC
-    virtually does not change in this phase, and its amplitude over the cycle is about 0.1 in people (Bovendeerd 2009,
-    Am J Physiol 297, H1058); at end-systole E_RC is 0.00 +- 0.08 and E_RL 0.04 +- 0.12 in mice (Zhong 2011)."""
+    """Largest mean of E_RC or E_RL over a layer, in either direction, at the end of isovolumic contraction. E_RC hardly
+    changes in this phase; its amplitude over the cycle is about 0.1 in people (Bovendeerd 2009, Am J Physiol 297,
+    H1058); at end-systole E_RC is 0.00 +- 0.08 and E_RL 0.04 +- 0.12 in mice (Zhong 2011)."""
     level_circumferential_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.06
     """Largest mean of E_CC over a fifth of the wall's height, in either direction, at the end of isovolumic
-    contraction. No part of a healthy wall beats before the heart ejects: base, middle and apex begin to shorten
-    together (Young & Cowan 2012)."""
+    contraction. Base, middle and apex of a healthy wall begin to shorten together (Young & Cowan 2012)."""
     segment_circumferential_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.07
     """Largest mean of E_CC over an AHA segment, in either direction, at the end of isovolumic contraction."""
     level_radial_strain_ivc_max: FiniteFloat | None = 0.15
@@ -105,8 +99,8 @@ class Physiology(Section):
     level_fibre_strain_ivc_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.07
     """Largest mean strain along the fibres of a level, in either direction, at the end of isovolumic contraction."""
     fibre_shortening_rate_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 10.0
-    """Fastest shortening of the fibres of a level, in lengths per second, between two frames; about as fast as a
-    mouse's muscle shortens without a load. `rat` 7, `human` 3."""
+    """Fastest shortening of the fibres of a level between two frames, in lengths per second: about that of a mouse's
+    muscle without a load. `rat` 7, `human` 3."""
     fibre_strain_spread_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.4
     """Largest standard deviation over the wall of the strain along the fibres at end-systole, over its mean. Muscle
     adapts until its fibres shorten alike (Arts 1994, Biophys J 66, 953)."""
@@ -122,8 +116,8 @@ class Physiology(Section):
     """Largest wall-mean radial strain at end-systole; `human` 0.95: studies of people by echo have means of 35 to 59 %,
     an E_RR of 0.41 to 0.76 (Yingchoncharoen 2013, J Am Soc Echocardiogr 26, 185)."""
     segment_circumferential_strain_min: FiniteFloat | None = -0.3
-    """Smallest mean of E_CC over an AHA segment at end-systole; bounds of segments are those of the wall, wider by what
-    segments of people differ: septum -17, lateral wall -22 % (docs/physiology.md). `human` -0.32."""
+    """Smallest mean of E_CC over an AHA segment at end-systole: that of the wall, wider by what segments of people
+    differ (septum -17, lateral wall -22 %; docs/physiology.md). `human` -0.32."""
     segment_circumferential_strain_max: FiniteFloat | None = -0.04
     """Largest mean of E_CC over an AHA segment at end-systole: every segment of a healthy heart shortens."""
     segment_longitudinal_strain_min: FiniteFloat | None = -0.32
@@ -148,9 +142,8 @@ class Physiology(Section):
     tei_index_max: Annotated[FiniteFloat, Field(ge=0)] | None = 0.8
     """Largest Tei index; 0.7 in mice and rats after an infarction (the same studies)."""
     filling_ratio_min: Annotated[FiniteFloat, Field(ge=0)] | None = 0.7
-    """Smallest ratio of early filling to that by the atrium, E/A, of the rates of volume; that of velocities is 0.8 to
-    2 in people whose relaxation is healthy (Nagueh 2016, J Am Soc Echocardiogr 29, 277). Hearts whose waves are fused
-    have none."""
+    """Smallest ratio E/A of the rates of early filling and of that by the atrium; 0.8 to 2 (of velocities) in people
+    whose relaxation is healthy (Nagueh 2016, J Am Soc Echocardiogr 29, 277). Not checked if the waves are fused."""
     filling_ratio_max: Annotated[FiniteFloat, Field(ge=0)] | None = 3.0
     """Largest ratio E/A."""
 

@@ -16,7 +16,7 @@ MAX_DEPTH = 30
 MAX_VALUES = 100_000
 """Largest number of values of a file, keys included, each counted as often as aliases repeat it."""
 MAX_ERRORS = 20
-"""Largest number of errors that are told at once."""
+"""Largest number of errors that are shown at once."""
 
 
 class ConfigError(ValueError):
@@ -24,7 +24,7 @@ class ConfigError(ValueError):
 
 
 class Errors:
-    """Collects the errors of a configuration, so that all are told at once, each once.
+    """Collects the errors of a configuration, so that all are shown at once, each once.
 
     Examples
     --------
@@ -52,7 +52,7 @@ class Errors:
 
     @property
     def are_enough(self) -> bool:
-        """Whether there are more than are told, or so many alike that a search for others takes long."""
+        """Whether there are more than are shown, or so many alike that a search for others takes long."""
         return len(self.messages) >= 10 * MAX_ERRORS or len(set(self.messages)) > MAX_ERRORS
 
     def raise_all(self, source: str) -> None:

@@ -14,10 +14,10 @@ from echotruth.section import OF_ZARR, Name, Positive, Section, check, invalid, 
 Reference = Annotated[
     Literal["ED", "previous", "bidirectional"],
     Field(
-        description="Frame with which each frame is compared: `ED`; or the `previous` one, with the steps added along "
-        "the path of the tissue; or `bidirectional`, likewise from ED both forwards and, as the cycle closes, "
-        "backwards, and both averaged with weights from the correlation of the frames; a clip that is no closed cycle, "
-        "as of a view that drifts or breathes, is tracked forwards only, unless its last frame is like the first."
+        description="Frame with which each frame is compared: `ED`; the `previous` one, with the steps added along "
+        "the path of the tissue; or `bidirectional`, likewise both forwards and backwards around the cycle, averaged "
+        "with weights from the correlation of the frames. Warns if the cycle is open, and then tracks forwards only, "
+        "unless the last frame is like the first."
     ),
 ]
 
@@ -47,8 +47,8 @@ class PhaseCorrelation(Section):
     taper: Literal["none", "hann"] = "none"
     """Weights of the pixels of a window before the Fourier transform."""
     spectral_threshold: Annotated[FiniteFloat, Field(ge=0, lt=1)] = 0.0
-    """Magnitude, relative to the largest, below which a frequency is left out: it holds only noise, to which
-    phase-only correlation would give the same weight as to speckle."""
+    """Magnitude, relative to the largest, below which a frequency is left out as noise, to which phase-only correlation
+    would give the same weight as to speckle."""
     dynamic_range_dB: DynamicRange = 0.0
     reference: Reference = "ED"
 
@@ -90,14 +90,14 @@ class BsplineDic(Section):
     knots_mm: Positive = 0.4
     """Distance between knots; 5 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
     margin_um: Annotated[FiniteFloat, Field(ge=0)] = 180.0
-    """Pixels up to this distance from the wall are used too; the edge of the wall shows how it thickens. Default: as
+    """Distance from the wall up to which pixels are used too; the edge of the wall shows how it thickens. Default: as
     suits `bmode.field_of_view_mm`."""
     dynamic_range_dB: Annotated[FiniteFloat, Field(ge=0, le=120)] = 45.0
     """Dynamic range of the images, by which log compression is undone: dark gaps between speckles change more than the
     bright speckles do. 0 uses the grey values."""
     gain_mm: Annotated[FiniteFloat, Field(ge=0)] = 0.6
-    """Distance over which the gain of the images is made even, the standard deviation of a Gaussian: tissue in a shadow
-    counts like the rest. 0 leaves it as it is. Default: as suits `bmode.field_of_view_mm`."""
+    """Standard deviation of the Gaussian over which the gain is made even, so that tissue in a shadow counts like the
+    rest; 0 for none. Default: as suits `bmode.field_of_view_mm`."""
     blur_px: Annotated[FiniteFloat, Field(ge=0, le=5)] = 0.6
     """Standard deviation of the Gaussian blur of images with pixels much larger than `speckle_pixel_um`, against
     aliasing; images with pixels of that size are not blurred."""
@@ -105,9 +105,8 @@ class BsplineDic(Section):
     """Size of pixels that resolve the speckle fully: speed of sound / (6 bandwidth). Default: as suits
     `bmode.field_of_view_mm`."""
     smoothness: Positive | None = None
-    """Weight of the bending energy of a step from one frame to the next. It is multiplied by the power of the noise
-    over that of the speckle, and by the speckle length over the distance between knots. Default: what the images of the
-    step give most evidence for."""
+    """Weight of the bending energy of a step, times the power of the noise over that of the speckle and the speckle
+    length over the distance between knots. Default: the weight for which the images of the step give most evidence."""
     transmural_scale: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Scale of lengths through the wall in the bending energy; lengths along the wall have the scale 1."""
     tolerance: Positive = 4.0
@@ -117,15 +116,15 @@ class BsplineDic(Section):
     reference: Annotated[
         Literal["previous", "bidirectional"],
         Field(
-            description="Forwards from ED only (`previous`), or `bidirectional`: backwards too, as the cycle closes, "
-            "and both averaged with weights from their variances; a clip that is no closed cycle, as of a view that "
-            "drifts or breathes, is tracked forwards only, unless its last frame is like the first."
+            description="Forwards from ED only (`previous`), or `bidirectional`: forwards and backwards around the "
+            "cycle, averaged with weights from their variances. Warns if the cycle is open, and then tracks forwards "
+            "only, unless the last frame is like the first."
         ),
     ] = "bidirectional"
 
 
 class BsplineCnn(BsplineDic):
-    """`bspline_dic` and a network that corrects its motion, which has learned from hearts of other settings."""
+    """`bspline_dic` and a network, learned from drawn hearts, that corrects its motion."""
 
     method: Literal["bspline_cnn"] = "bspline_cnn"  # type: ignore[assignment]
     """Name of the method."""
@@ -262,8 +261,8 @@ class Onnx(Section):
     method: Literal["onnx"] = "onnx"
     """Name of the method."""
     model: Annotated[str, Field(min_length=1)]
-    """File of the model. What its graph does not tell is declared in a file beside it of the same name with the ending
-    .yaml (docs/trackers.md)."""
+    """File of the model. A file beside it of the same name with the ending .yaml declares what its graph does not say
+    (docs/trackers.md)."""
     timeout_s: Positive = 3600.0
     """Longest time that the model may take for one clip."""
 

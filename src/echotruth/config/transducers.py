@@ -27,8 +27,8 @@ at these frequencies.
 The heart lies at the transmit focus and entirely in the field of view. A resolution cell (beam width x pulse length x
 slice thickness) contains at least ten scatterers; with the 2800 per mm^3 of mouse_25MHz the speckle SNR is 1.816, and
 1.913 for fully developed speckle, and tracker error shows no consistent trend with density in a heart
-with the fibres of config/paper.yaml (benchmarks/results/density.md). Focal zones are about half a depth of field apart,
-which is 7 wavelength (focus / aperture)^2, and their foci extend over most of the heart.
+with the fibres of config/paper.yaml (benchmarks/density.py of 02d7c8a). Focal zones are about half a depth of field
+apart, which is 7 wavelength (focus / aperture)^2, and their foci extend over most of the heart.
 """
 
 from __future__ import annotations

@@ -259,7 +259,7 @@ class DrawingServer(ThreadingHTTPServer):
         return f"http://{LOCAL}:{self.server_port}/"
 
     def run(self, ready: Callable[[], None]) -> None:
-        """Answer until the process is interrupted or told to end.
+        """Answer until the process is interrupted or asked to end.
 
         Parameters
         ----------

@@ -156,7 +156,7 @@ def _array(path: Path) -> Recording:
 
 
 def _loaded(path: Path) -> NDArray[Any]:
-    """Array of a NumPy file, which is not read before its header is known to tell no more than the file holds."""
+    """Array of a NumPy file, which is not read before its header is known to promise no more than the file holds."""
     try:
         return np.lib.format.open_memmap(path, mode="r")
     except Exception as error:  # NumPy parses the header as Python, and raises whatever that does

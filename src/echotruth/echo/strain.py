@@ -28,7 +28,7 @@ GRID_PX, IMAGE_PX = 5, 512
 """Spacing of the points in a mouse's clip, and the side of that clip, which shows 12 mm."""
 
 MIN_WALL_PX = 6.0
-"""Thickness of the wall below which nothing can be told of its strain, px."""
+"""Thickness of the wall below which its strain cannot be measured, px."""
 WALLS_MM = 0.5, 50.0
 """Thickness of the thinnest and of the thickest wall that is tracked: beyond, the side of a pixel is wrong."""
 

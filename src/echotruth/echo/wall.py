@@ -179,7 +179,7 @@ class Wall:
         return distances[0] / np.where(total > 0, total, 1), across / np.where(length > 0, length, 1)
 
     def segment(self, position: Floats) -> NDArray[np.int64]:
-        """AHA segment of positions (n, 2), px; 0 where the view or the missing insertions do not tell."""
+        """AHA segment of positions (n, 2), px; 0 where the view or the missing insertions do not define it."""
         if self.plane == "long_axis":
             return self._segment_along(position)
         if self.view not in SEPTAL_AND_FREE or self.insertions is None:

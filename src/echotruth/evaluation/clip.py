@@ -37,7 +37,7 @@ class Clip:
     frame_step : int
         Step between the frames that a tracker is given.
     is_closed : bool
-        Whether the first frame follows the last one; trackers are not told.
+        Whether the first frame follows the last one; trackers do not know.
     """
 
     frames: np.ndarray

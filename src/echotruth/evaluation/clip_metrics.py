@@ -32,7 +32,7 @@ from echotruth.repository.schema import LABELS, SCORES
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
 
 SORTS = ("heart", "split", "group", "acoustics", "variation")
-"""Labels of the table of cases that sort clips; `heart` is the one that hearts are told apart by."""
+"""Labels of the table of cases that sort clips; `heart` is the one that distinguishes hearts."""
 
 BEGIN = (*KEYS[:2], "plane", *KEYS[2:], *SORTS, "diagnosis")
 """Columns with which every table begins."""

@@ -28,7 +28,7 @@ KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
 
 HEART = "heart"
-"""Column that tells the hearts apart."""
+"""Column that distinguishes the hearts."""
 
 RANKED_BY = "nrmse_all_percent"
 """Metric by which trackers are ranked."""

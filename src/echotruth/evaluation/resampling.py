@@ -88,7 +88,7 @@ def means_of_hearts(clips: pd.DataFrame, columns: Sequence[str], heart: str = "c
     columns : sequence of str
         Metrics.
     heart : str
-        Column that tells the hearts apart.
+        Column that distinguishes the hearts.
 
     Returns
     -------

@@ -35,7 +35,7 @@ COVERED = 0.9
 """Probability of the intervals."""
 
 IDENTIFIABLE = 0.8
-"""Standard deviation of the posterior over that of the prior, above which the observations tell next to nothing."""
+"""Standard deviation of the posterior over that of the prior, above which a parameter is not identifiable."""
 
 POSITIVE = ("stiffness.", MATERIAL, TENSION)
 """Beginnings of the names of what is positive, and has a prior on a logarithmic scale."""
@@ -75,7 +75,7 @@ def infer(
         `prior_sd`, and `identifiable`, whether the standard deviation (of stiffness and tension: of its logarithm) is
         at most 0.8 of the prior's. Parameters `contractility.N` and `stiffness.N` are means over the muscle of AHA
         segments, relative to the mean of the whole wall (the geometric one of stiffness). They are of the draws
-        `posterior` and `prior` (draw, parameter); `scar` (draw, aha) tells in which of the first a segment is a scar,
+        `posterior` and `prior` (draw, parameter); `scar` (draw, aha) says in which of the first a segment is a scar,
         `scar_probability` (aha) in how many, NaN of a segment that no view shows and where no scar is tried, and
         `replicated` (draw, observation) what would be seen, with errors. By `observation`: `observed`, `predicted` of
         the most probable heart, `residual` and `sd_error`, and `covariance` (observation, other) of the errors, that of

@@ -70,7 +70,7 @@ def observe(
         Pixels along a side of the images.
     errors : str or Path, optional
         Table of the errors of trackers (docs/inference.md). Default: that of the package. Errors of the heart itself
-        in it do not count; trackers are told apart by their names.
+        in it do not count; trackers are distinguished by their names.
 
     Returns
     -------

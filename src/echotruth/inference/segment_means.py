@@ -1,7 +1,7 @@
 """Contractility and stiffness of AHA segments as means over their muscle, relative to the whole wall.
 
 A common factor of the contractility of all segments changes no motion, because the active tension is that which gives
-the loop; nor does one of their stiffness, since C is that which fills the heart. What motion tells is the ratio of a
+the loop; nor does one of their stiffness, since C is that which fills the heart. Motion determines the ratio of a
 segment to the wall.
 """
 

@@ -16,7 +16,7 @@ with the covariance
     f var(c) (1 + 1/H) 1 1^T + ((v + k d^2) (I - 1 1^T / N) + var(g) (y - m(y)) (y - m(y))^T) / g^2,
 
 f = (t_95(H - 1) / z_95)^2, with H hearts; f widens it as Student's t distribution is wider than the normal one, since
-few hearts tell var(c) badly. The tracked values are regressed on the true ones and not these on them, which would hold
+few hearts give a poor var(c). The tracked values are regressed on the true ones and not these on them, which would hold
 how much segments differ in these hearts: that is for the prior to say.
 """
 
@@ -52,7 +52,7 @@ LIMITS = {"mean": (-np.inf, np.inf), "correlation": (-1.0, 1.0), "segments": (1.
 GAIN_SD = 0.3
 """Standard deviation of the gain, about 1, before anything is known of a tracker."""
 LEAST_GAIN = 0.1
-"""Taken where less is found: such a tracker tells next to nothing of how segments differ, and its errors say so."""
+"""Taken where less is found: such a tracker hardly shows how segments differ, and its errors say so."""
 LEAST_VARIANCE = 1e-12
 """Of the error of a segment, so that a tracker without one has a gain."""
 ROUNDS = 3

@@ -15,7 +15,7 @@ _NOISE_SDS = 4.0
 """Standard deviations of the noise that count as no change of volume."""
 
 _NOISY_FRAMES = 32
-"""With fewer frames the second differences of a curve are its own bend, of several percent, and tell no noise."""
+"""With fewer frames the second differences of a curve are its own bend, of several percent, and not noise."""
 
 
 def es_frame(pressure: Floats, volume: Floats) -> int:
@@ -60,7 +60,7 @@ def phases(pressure: Floats, volume: Floats) -> NDArray[np.uint8]:
 def leak(volume: Floats, stroke_volume: float) -> float:
     """Change of volume, m^3, that may pass a closed valve: noise, and 1 to 10 % of the stroke volume.
 
-    With fewer than 32 frames, noise cannot be told from the bends of the curve, and it is 1 %.
+    With fewer than 32 frames, noise cannot be distinguished from the bends of the curve, and it is 1 %.
 
     Parameters
     ----------

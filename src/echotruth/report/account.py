@@ -1,4 +1,4 @@
-"""What a page tells of a repository: how much was made, what failed, and what the stages took."""
+"""What a page says of a repository: how much was made, what failed, and what the stages took."""
 
 from collections.abc import Iterable, Iterator
 from itertools import islice
@@ -75,7 +75,7 @@ def _inferred(case: str, rows: pd.DataFrame) -> dict[str, Any]:
 
 
 def _not_estimated(repository: Repository) -> Iterator[dict[str, str]]:
-    """What trackers have no estimate of in the first heart that is shown, with the reason; failures are told apart."""
+    """What trackers have no estimate of in the first heart that is shown, with the reason; failures are apart."""
     table = repository.summary(cases=repository.shown[:1]) if repository.shown else None
     if table is None or not len(table):
         return

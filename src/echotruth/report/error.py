@@ -18,7 +18,7 @@ Errors = Mapping[str, Mapping[str, Mapping[int, np.ndarray]]]
 
 @style.styled
 def draw(errors: Errors, longitudinal: Collection[str] = ()) -> Figure:
-    """Draw the error by layer, one panel per view, on a logarithmic axis, on which good and bad trackers can be told.
+    """Draw the error by layer, one panel per view, on a logarithmic axis, which shows good and bad trackers.
 
     Parameters
     ----------

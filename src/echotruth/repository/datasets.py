@@ -54,7 +54,7 @@ def clip_dataset(
 
 
 def source_of(heart: Heart, plane: Plane) -> dict[str, Any]:
-    """Attributes `SOURCE`: origin and axes of the plane, and what tells the motion of the heart from others."""
+    """Attributes `SOURCE`: origin and axes of the plane, and what identifies the motion of the heart."""
     found = plane.origin.tolist(), plane.axes.ravel().tolist(), fingerprint(heart)
     return dict(zip(SOURCE, found, strict=True))
 
@@ -121,5 +121,5 @@ def imaged_heart(clip: xr.Dataset, heart: Heart) -> tuple[Heart, Plane]:
 
 
 def fingerprint(heart: Heart) -> str:
-    """Twelve hexadecimal digits that tell one motion from another."""
+    """Twelve hexadecimal digits that identify a motion."""
     return sha256(np.ascontiguousarray(heart.displacement).tobytes()).hexdigest()[:12]

@@ -58,7 +58,7 @@ def place(group: str, heart: str, case: str, view: str | None = None) -> str:
 
 
 class JobPlace(NamedTuple):
-    """A job by what tells it apart: its stage, case and, if it is of a view, view and tracker."""
+    """A job by what identifies it: its stage, case and, if it is of a view, view and tracker."""
 
     stage: str
     case: str

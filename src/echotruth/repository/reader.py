@@ -351,7 +351,7 @@ class Repository:
             a short axis and longitudinal (GLS) in a long axis; `rotation` (frame), rad, counter-clockwise seen from the
             apex, NaN in a long axis; and of each its `_rate`, per second. Measures are `engineering` and
             `green_lagrange`, components RR (radial), TT (circumferential or longitudinal) and RT (shear; engineering:
-            rad). `time` (frame) is in s, and the attributes tell es_frame and end_systole (s). The true curves do not
+            rad). `time` (frame) is in s, and the attributes have es_frame and end_systole (s). The true curves do not
             depend on the tracker.
 
         Raises
@@ -462,7 +462,7 @@ class Repository:
         ClipMetrics
             Three tables. `clips` has a row per case, view, size_px and tracker; `segments` one per clip, tracker, AHA
             segment and component of strain; `reliability` one per clip, tracker and tenth of quality. docs/metrics.md
-            tells their columns, which name their units. All begin with case, view, plane, size_px and tracker, and with
+            lists their columns, which name their units. All begin with case, view, plane, size_px and tracker, and with
             heart, split, group, acoustics and variation, which are labels of the table of cases, "" where it has none
             (without a label, heart is the column of that name), and the diagnosis.
 

@@ -74,7 +74,7 @@ class Remote:
         return sorted(name for name in names if name.endswith(".zarr"))
 
     def _asked(self, request: Callable[[], T]) -> T:
-        """Answer to a request; a failure is told in a sentence."""
+        """Answer to a request; a failure is a sentence."""
         from obstore.exceptions import BaseError
 
         try:

@@ -45,7 +45,7 @@ class PairTracker(Protocol):
 
 @dataclass(frozen=True)
 class Path:
-    """Displacement of points since the first frame, and what tells how far it may be off.
+    """Displacement of points since the first frame, and how far it may be off.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class Path:
         Distance of the displacements forwards and backwards, px; NaN where there is only one of them.
     unseen : ndarray of shape (frame, n), optional
         From 0 to 1: how far the image shows no tissue at the point, which then moves with what is around it. None of a
-        tracker that does not tell.
+        tracker that gives none.
     deviation : ndarray of shape (frame, n), optional
-        Standard deviation of the error along each axis, px, of a tracker that tells it.
+        Standard deviation of the error along each axis, px, of a tracker that gives it.
     """
 
     displacement: np.ndarray

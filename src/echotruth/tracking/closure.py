@@ -47,7 +47,7 @@ class Closure:
 
     @property
     def is_open(self) -> bool:
-        """Whether the clip is no closed cycle; not if that cannot be told, as it should be one.
+        """Whether the clip is no closed cycle; not if that is unknown, as it should be one.
 
         That speckle has changed does not make it open: the wall may have come back all the same.
         """
@@ -73,7 +73,7 @@ class Closure:
 def closure(frames: np.ndarray, mask: np.ndarray) -> Closure:
     """Compare the last frame of a clip with its first.
 
-    Dense flows from each frame to the next, and from the first to the last, tell the motion between them. What is left
+    Dense flows from each frame to the next, and from the first to the last, give the motion between them. What is left
     in the last frame is the mean of what the last flow and the sum of the others say: the one errs towards no motion
     where speckle is new, the other drifts.
 

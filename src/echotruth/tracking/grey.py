@@ -71,7 +71,7 @@ def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.nda
 
     Shadow, depth and obliquity of the wall change the gain slowly from place to place. Where it is low, speckle is as
     good as elsewhere, but would not count in least squares. Compare the divisive normalisation of Jarrett et al. 2009,
-    IEEE ICCV, 2146. Black pixels tell nothing of the gain and do not count. Below `MIN_GAIN_DB` it is made up for only
+    IEEE ICCV, 2146. Black pixels say nothing of the gain and do not count. Below `MIN_GAIN_DB` it is made up for only
     in part, lest noise becomes as bright as tissue.
 
     Parameters

@@ -10,7 +10,7 @@ REFERENCE_WALL_MM = 0.85
 LENGTHS = ("knots_mm", "subset_mm", "windows_mm")
 """Settings that say how large a piece of tissue is followed; the last of several windows gives the result."""
 MISFIT = 2.5
-"""Thickness of the wall over that which the lengths suit, or the inverse, above which they are told."""
+"""Thickness of the wall over that which the lengths suit, or the inverse, above which there is a warning."""
 REPEATED = 0.03
 """Difference of two consecutive frames in the wall, over the upper quartile of these, below which both are the same
 image: a video that is compressed anew hardly changes it."""

@@ -1,11 +1,10 @@
 """Quality of tracked points: the probability that a point is near its true place.
 
 Near means within 1/256 of the side of the image, the distance of 1 px of TAP-Vid (Doersch et al. 2022,
-arXiv:2211.03726). The error of a point is taken to be Gaussian in the plane. Its standard deviation follows from what a
-tracker can tell of itself: the correlation of the images along the path of the point and the size of their speckle, how
-far the paths forwards and backwards are apart, how far the point has moved, and the deviation that a network tells. The
-constants of each method are fitted by maximum likelihood (benchmarks/quality.py); docs/tracking.md says on which
-hearts.
+arXiv:2211.03726). The error of a point is taken to be Gaussian in the plane. Its standard deviation follows from the
+correlation of the images along the path of the point, the size of their speckle, the distance of the paths forwards and
+backwards, how far the point has moved, and the deviation that a network gives. The constants of each method are fitted
+by maximum likelihood (benchmarks/quality.py); docs/tracking.md says on which hearts.
 """
 
 from dataclasses import dataclass
@@ -29,12 +28,10 @@ class ErrorModel:
 
         s^2 = N prior^2 / (N + prior^2) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2 + (told S)^2,
 
-    where N = (speckle l)^2 V, D is the RMS of d over the points in the frame, q, from 0 to 1, how far the point is not
-    seen in the image, and S the deviation that the tracker itself tells, if it does. V l^2 is the variance of the
-    places of speckle. It counts in full where images are alike. Where they are not, the tracker relies on what it
-    expects of the motion, as a smooth one: with a prior the variance is the noise's times the prior's over their sum.
-    The two ways err together at many a point, but not at all of them, so that D tells more than d. Two ways that are
-    farther apart than the point has moved do not say that it is farther off.
+    where N = (speckle l)^2 V, D is the RMS of d over the points in the frame, q (0 to 1) how far the point is hidden,
+    and S the deviation that a tracker gives, if it does. V l^2 is the variance of the places of speckle. It counts in
+    full where images are alike; elsewhere the tracker relies on its prior, a smooth motion. Forward and backward errors
+    often agree, so the frame's RMS D adds to d. Ways that are farther apart than the point has moved add no more.
 
     Attributes
     ----------
@@ -95,7 +92,7 @@ class Squares:
     unseen : ndarray of shape (frame, n)
         q^2, a number.
     told : ndarray of shape (frame, n)
-        S^2, 0 of a tracker that tells none.
+        S^2, 0 if the tracker gives none.
     """
 
     variance: np.ndarray

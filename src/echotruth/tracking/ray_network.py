@@ -1,4 +1,4 @@
-"""A small convolutional network that corrects a tracked wall on rays and over the cycle, and tells how far it is off.
+"""A small convolutional network that corrects a tracked wall on rays and over the cycle, and says how far it is off.
 
 Its input is a periodic image: rows are phases of the cycle, columns are the rays of :mod:`.wall_rays`, and the points
 of a ray through the wall are channels. So both planes are alike to it, and what a part of the wall does in one frame is

@@ -29,7 +29,7 @@ def track(
     Parameters
     ----------
     frames : ndarray of shape (frame, axial, lateral)
-        B-mode clip, any real type; frame 0 is end-diastole. A clip that is no closed cycle is told, and tracked
+        B-mode clip, any real type; frame 0 is end-diastole. Warns if the cycle is open, which is then tracked
         forwards only unless its last frame is like the first.
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).

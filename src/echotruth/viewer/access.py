@@ -42,7 +42,7 @@ class Access(BokehTornado):
         return self.get_handler_delegate(request, Refusal, {"status": status, "sentence": sentence})
 
     def _refusal(self, request: HTTPServerRequest) -> tuple[HTTPStatus, str] | None:
-        """Status and sentence for what is not served, in the order in which it may be told."""
+        """Status and sentence for what is not served, in the order in which it may be said."""
         if request.host_name not in HOSTS or request.headers.get("Origin") not in (None, f"http://{request.host}"):
             return HTTPStatus.FORBIDDEN, f"This page answers at the names {', '.join(HOSTS)} alone."
         sessions = self.get_sessions("/")

@@ -101,7 +101,7 @@ def address(server: BaseServer) -> str:
 
 
 def run(server: BaseServer, ready: Callable[[], None]) -> None:
-    """Answer until the process is interrupted or told to end.
+    """Answer until the process is interrupted or asked to end.
 
     Parameters
     ----------

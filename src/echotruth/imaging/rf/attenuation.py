@@ -1,6 +1,6 @@
 """Attenuation proportional to frequency, applied to the traces of all echoes at once.
 
-In a full matrix the time of arrival tells the path, so that exp(-alpha (f - f0) c t) may be applied after the echoes
+In a full matrix the time of arrival gives the path, so that exp(-alpha (f - f0) c t) may be applied after the echoes
 have been summed. As a function of time and frequency it is of low rank: the sum of a few products of the two.
 """
 

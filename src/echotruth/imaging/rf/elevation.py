@@ -28,9 +28,9 @@ MAX_SLOPE = 1.0
 SLOPES_PER_BEAMWIDTH = 24
 """Slopes tabulated per wavelength over height."""
 MAX_SECOND_ORDER = 0.063
-"""Greatest square of the phase, rad^2, by which what is sent from the edge of an element may differ between an element
-and the mean of all, the path to their centres apart, times E over that in the plane. Terms of E beyond the first order
-grow with it; measured, echoes of a heart then err by less than 1 % (L2)."""
+"""Largest squared phase error (rad^2) of the common lens kernel: of the echo from the edge of an element relative to
+the mean of all elements, without the path to their centres, weighted by E over its value in the plane. The kernel is of
+first order in E; below this, echoes of a heart err by less than 1 % (L2, measured)."""
 
 
 class Lens:

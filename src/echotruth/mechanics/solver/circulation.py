@@ -39,7 +39,7 @@ ROUGH_TOLERANCE, NEAR = 1e-3, 0.1
 one may be."""
 
 LEAST_CHANGE = 0.01
-"""Difference of volume between two beats, over the stroke volume, from which it tells an elastance."""
+"""Difference of volume between two beats, over the stroke volume, from which an elastance follows."""
 
 DIASTOLIC_EXPONENT = 2.76
 """P ~ (V - V0)^2.76 of the filling heart in several species (Klotz et al., Am J Physiol 291 (2006) H403)."""

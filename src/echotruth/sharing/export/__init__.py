@@ -38,7 +38,7 @@ class Format:
     holds : {"clip", "view", "heart"}
         What a file is of.
     options : tuple of {"overlay", "rate", "trackers"}
-        What it can be told, beside which cases, views and sizes to write.
+        What options it takes, beside which cases, views and sizes to write.
     table : str
         Name of one more file, of all clips, that its module writes with `write_summary`; "" for none.
     """

@@ -124,7 +124,7 @@ def _calibrate(region: Any, clip: ExportedClip) -> None:
 
 
 def _heart(clip: ExportedClip) -> tuple[bytes, ...]:
-    """What tells one heart from another: its name and its motion."""
+    """What identifies a heart: its name and its motion."""
     names = f"{clip.case.config.name}/{clip.case.id}".encode()
     return names, np.ascontiguousarray(clip.heart.nodes).tobytes(), clip.heart.displacement.tobytes()
 

@@ -2,7 +2,7 @@
 
 The wall is cut by rays from the middle of the cavity (:mod:`echotruth.tracking.wall_rays`). At points of these rays the
 network is given the displacement, how far both ways are apart and how well images match along them, and the brightness
-that follows each point: where a border of the wall is lost, it changes. It tells what has to be added and how far the
+that follows each point: where a border of the wall is lost, it changes. It gives what has to be added and how far the
 sum is still off (:mod:`echotruth.tracking.ray_network`). Between the points, and between phases of the cycle, the
 correction is interpolated linearly.
 """
@@ -28,7 +28,7 @@ SHARES = np.array([-0.3, -0.1, 0.1, 0.5, 0.9, 1.1, 1.3])
 BLUR = 0.12
 """Standard deviation of the blur of that brightness, over the thickness of the wall."""
 LARGEST = 3.0
-"""Largest displacement and difference of both ways that the network is told, over the scale: one that has gone astray
+"""Largest displacement and difference of both ways that the network is given, over the scale: one that has gone astray
 in black images may be anywhere."""
 LEAST_SCALE = 0.1
 """Scale of a motion at least, over the thickness of the wall."""
@@ -51,7 +51,7 @@ ODD = [number for number, name in enumerate(CHANNELS) if name.startswith(("acros
 MIRRORED = (RAYS // 2 - np.arange(RAYS)) % RAYS
 """Ray that each is in the mirror: the one at an angle a is at pi - a."""
 LEAST_FRAMES = 6
-"""Frames of a beat at least, of which 24 phases can be told."""
+"""Frames of a beat at least, of which 24 phases can be distinguished."""
 
 
 @dataclass(frozen=True)
