@@ -1,8 +1,11 @@
 """Meshes and motions of which everything is known, and a browser."""
 
+import os
 import shutil
+from collections import Counter
 from dataclasses import replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 import cores  # noqa: F401 - before whatever multiplies or compiles
@@ -20,8 +23,24 @@ from echotruth.heart import Heart
 from echotruth.mechanics.fibres import wall_depth
 from echotruth.mechanics.geometry import left_ventricle
 
-LONGEST = ("test_site", "test_slurm", "test_snakemake", "test_circulation", "test_checks", "test_states")
-"""Modules that take a minute and more, longest first."""
+
+def pytest_terminal_summary(terminalreporter):
+    """Where the time went: the modules that took longest."""
+    seconds = Counter()
+    for report in chain.from_iterable(terminalreporter.stats.values()):
+        if isinstance(report, pytest.TestReport):
+            seconds[report.nodeid.partition("::")[0]] += report.duration
+    if len(seconds) > 10:
+        terminalreporter.section("modules that took longest")
+        for module, duration in seconds.most_common(10):
+            terminalreporter.write_line(f"{duration:6.0f} s  {module}")
+
+
+LONGEST = (
+    *("test_site", "test_slurm", "test_states", "test_browser", "test_snakemake", "test_checks", "test_circulation"),
+    *("test_added_tracker", "test_examples", "test_notebook", "test_estimate", "test_full_matrix", "test_baselines"),
+)
+"""Modules that take half a minute and more, longest first."""
 
 
 def pytest_collection_modifyitems(items):
@@ -29,6 +48,14 @@ def pytest_collection_modifyitems(items):
     slow = {item.path for item in items if item.get_closest_marker("slow")}
     rank = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (rank.get(item.path.stem, len(LONGEST)), item.path not in slow))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def disk():
+    """Nobody waits for it: no test cuts the power, and waiting takes a third of the time of a small repository."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda descriptor: None)
+        yield
 
 
 QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")

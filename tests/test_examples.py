@@ -59,12 +59,6 @@ def test_example_of_a_repository_shows_that_an_infarct_lowers_strain_and_ejectio
     assert (np.abs(healthy) > np.abs(infarct)).all()
 
 
-def test_example_of_a_repository_says_how_to_get_one(monkeypatch):
-    monkeypatch.setattr(sys, "argv", ["global_strain.py", "out/none"])
-    with pytest.raises(FileNotFoundError, match="give the folder that a run made"):
-        run("global_strain")
-
-
 @pytest.mark.slow
 def test_blocks_of_the_page_about_python_run_one_after_the_other():
     page, names = (EXAMPLES.parent / "docs/python.md").read_text(), {}

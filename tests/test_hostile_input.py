@@ -114,7 +114,7 @@ BAD_ARRAYS = [array_file(shape=(10**6, 10**4, 11368)), array_file(TOUCHING, shap
 BAD_ARRAYS += [b"PK\x03\x04" + bytes(30), b"\x93NUMPY\x01\x00\x10\x00{'descr': (((    \n"]
 
 
-@pytest.mark.parametrize("name", ["demo", "human", "sweep", "hearts", "learning"])
+@pytest.mark.parametrize("name", ["demo", "human", "sweep", "hearts"])
 def test_configuration_is_refused_or_read_as_it_is_written(name, tmp_path):
     path = tmp_path / f"{name}.yaml"
 

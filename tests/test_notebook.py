@@ -283,6 +283,7 @@ def test_pixels_that_are_not_known_are_told(clip):
         et.track(with_pixel(clip, np.nan), "dis")
 
 
+@pytest.mark.slow
 def test_repeated_frame_and_lengths_for_another_heart_are_told(clip):
     image = clip["image"].copy()
     image[1] = image[0]

@@ -31,9 +31,9 @@ cases: {seed: [1, 2]}
 """A run that takes seconds: one heart, which moves as a rigid body, seen with two seeds."""
 
 
-def alone(folder: Path) -> Path:
-    """Folder of the repository of `CONFIG` that its jobs make in this process, one after the other."""
-    return finish(folder / "tiny", et.configure(yaml.safe_load(CONFIG)), solved)
+def alone(folder: Path, config: str = CONFIG) -> Path:
+    """Folder of the repository that its jobs make in this process, one after the other."""
+    return finish(folder / "tiny", et.configure(yaml.safe_load(config)), solved)
 
 
 class Workspace:

@@ -46,7 +46,7 @@ class Results:
 
 def measure(quick: bool = False) -> Results:
     """Works of the default heart, or of a coarse one if `quick`."""
-    return balance(heart.solved(*((12, 6, 1) if quick else heart.DEFAULT_MESH)))
+    return balance(heart.solved(*((6, 4, 1) if quick else heart.DEFAULT_MESH)))
 
 
 def balance(solved: heart.SolvedBeat) -> Results:

@@ -29,13 +29,6 @@ def is_refused(status, output, errors):
     return status != 0 and not output and errors.count("\n") == 1 and "Traceback" not in errors
 
 
-@pytest.mark.parametrize("name, cases", [("demo", 1), ("sweep", 108), ("human", 1), ("hearts", 24)])
-def test_check_accepts_a_shipped_configuration(name, cases):
-    status, output, errors = run_cli("check", f"config/{name}.yaml")
-    assert (status, errors) == (0, "")
-    assert f"valid; cases: {cases}," in output
-
-
 BAD = {
     "fibres: {endo_deg: 95}": "fibres.endo_deg = 95",
     "geometri: {}": "did you mean geometry?",
@@ -72,10 +65,6 @@ def test_what_is_not_a_text_file_is_refused_in_one_line(tmp_path, name, content)
         (tmp_path / name).write_bytes(content)
     status, output, errors = run_cli("check", name, cwd=tmp_path)
     assert is_refused(status, output, errors) and name in errors, errors
-
-
-def test_unknown_option_is_refused_in_one_line():
-    assert is_refused(*run_cli("check", "config/demo.yaml", "--cores", "2"))
 
 
 def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
@@ -136,12 +125,6 @@ def test_absurd_is_refused_and_run_if_it_is_asked_for_and_an_estimate_runs_nothi
     ]
     monkeypatch.setattr("echotruth.cli.run._make", lambda *_: 0)
     assert run_cli("run", "absurd.yaml", "--yes", cwd=tmp_path) == (0, "", "")
-
-
-def test_help_names_every_command():
-    status, output, _ = run_cli("--help")
-    assert status == 0
-    assert all(command in output for command in ("check", "cases", "run", "merge", "export", "evaluate"))
 
 
 def test_version():

@@ -9,7 +9,6 @@ import pytest
 
 from echotruth import cli
 from echotruth.cli.command import Parser
-from echotruth.cli.snakemake import PROFILES
 
 NAMES = list(cli.COMMANDS)
 
@@ -19,10 +18,6 @@ def test_help_has_description_examples_and_exit_statuses(call, name):
     status, output, errors = call(name, "--help")
     assert (status, errors) == (0, "")
     assert re.search(r"examples:\n  echotruth " + name, output) and re.search(r"exit status:\n  0  \w+", output)
-
-
-def test_help_of_run_names_the_profiles_of_the_package(call):
-    assert f"where jobs run: {', '.join(PROFILES)}, or a folder" in call("run", "--help")[1]
 
 
 @pytest.mark.parametrize("name", NAMES)

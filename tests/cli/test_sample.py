@@ -42,6 +42,7 @@ def test_it_is_whole_and_finished():
     assert report.groups == 2 * 6 + 2 * 2 * 5, "without scatterers and lines"
 
 
+@pytest.mark.slow
 def test_it_is_in_the_users_cache_or_where_that_cannot_be_written_in_a_folder_that_does_not_stay(tmp_path):
     code = "import echotruth as et; et.sample().scores; print(et.sample().folder, et.sample().is_sample)"
 

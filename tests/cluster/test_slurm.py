@@ -29,11 +29,13 @@ NOT_STARTED = 78
 
 def test_slurm_makes_the_bytes_of_jobs_in_one_process(tmp_path):
     cluster = Workspace(tmp_path / "cluster")
-    run = cluster.start("timeout", LIMIT, str(CLUSTER), *COMMAND, "run", "tiny.yaml", "--profile", "slurm")
+    run = cluster.start(
+        "timeout", LIMIT, str(CLUSTER), *COMMAND, "run", "tiny.yaml", "repository", "--profile", "slurm"
+    )
     output, _ = run.communicate()
     if run.returncode == NOT_STARTED:
         pytest.skip(f"SLURM does not start on this machine: {output[-500:]}")
     assert run.returncode == 0, output
     assert content(cluster.out) == content(alone(tmp_path / "alone"))
     submitted = (cluster.out / "logs/snakemake.log").read_text().count("has been submitted with SLURM jobid")
-    assert submitted <= 5  # two hearts, their views, and repository with report; not one a rule and heart
+    assert submitted <= 5  # two hearts, their views, and the repository; not one a rule and heart

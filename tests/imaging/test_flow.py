@@ -97,12 +97,12 @@ class Beating:
 
 @pytest.fixture(scope="module")
 def solved():
-    return et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT, loop={"frames": 20}))
+    return et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT, loop={"frames": 12}))
 
 
 @pytest.fixture(scope="module")
 def beating():
-    heart = et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT, mechanics=EVEN, loop={"frames": 20}))
+    heart = et.beat(et.configure(geometry=SMALL, fibres=STRAIGHT, mechanics=EVEN, loop={"frames": 12}))
     return Beating(heart, "long_axis")
 
 
@@ -126,6 +126,7 @@ def test_flow_composes_to_the_motion_since_end_diastole_where_tissue_does_not_le
     assert error[kept].max() <= 0.05
 
 
+@pytest.mark.slow
 def test_flow_composes_nearly_so_within_the_slice_and_is_lost_only_along_the_edge_of_the_wall(composed):
     error, elevation = composed
     assert elevation.max() < 25e-6

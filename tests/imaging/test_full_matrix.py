@@ -42,7 +42,7 @@ def error(probe, position, amplitude, lens=False, **options):
     return relative(found, exact_matrix(probe, position, amplitude, matrix.frequency[::6], elevation=lens))
 
 
-@pytest.mark.parametrize("attenuation", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("attenuation", [0.0, 1.0])
 def test_in_the_plane_the_rf_is_the_exact_sum_with_directivity_and_attenuation(attenuation):
     probe = Probe(attenuation_dB_per_cm_MHz=attenuation)
     assert error(probe, *sector(60)) < PLANE_ACCURACY
@@ -67,13 +67,7 @@ def test_the_memory_of_the_spectra_of_clusters_is_bounded(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "preset, scale, half_angle",
-    [
-        ("mouse_30MHz", 1, 24),
-        ("mouse_40MHz", 1, 24),
-        ("rat_15MHz", 2, 32),
-        ("human_2_7MHz", 12, 32),
-        ("human_3MHz", 12, 32),
-    ],
+    [("mouse_40MHz", 1, 24), ("rat_15MHz", 2, 32), ("human_3MHz", 12, 32)],
 )
 def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     """Elements of 0.88 wavelengths only within 24 degrees: further out their echoes are longer than a kernel."""
@@ -83,10 +77,14 @@ def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
 
 
 @pytest.mark.parametrize(
-    "preset, scale", [("mouse_25MHz", 1), pytest.param("human_2_7MHz", 12, marks=pytest.mark.slow)]
+    "preset, scale, depth, edge_width",
+    [
+        ("mouse_25MHz", 1, 1.5e-3, 0.5e-3),
+        ("mouse_25MHz", 1, 4e-3, 0.5e-3),
+        pytest.param("mouse_25MHz", 1, 4e-3, 0.0, marks=pytest.mark.slow),
+        pytest.param("human_2_7MHz", 12, 1.5e-3, 0.5e-3, marks=pytest.mark.slow),
+    ],
 )
-@pytest.mark.parametrize("depth", [1.5e-3, 4e-3])
-@pytest.mark.parametrize("edge_width", [pytest.param(0.0, marks=pytest.mark.slow), 0.5e-3])
 def test_behind_a_rib_the_rf_is_the_exact_sum_of_what_passes(preset, scale, depth, edge_width):
     probe = Probe(preset=preset)
     edges = {"edge_deg": 3.0, "edge_width_mm": edge_width * scale * 1e3}
@@ -114,10 +112,9 @@ def lens_errors(probe, depth, beside, bands):
     "preset, attenuation, depth, beside, bands",
     [
         ("mouse_25MHz", 0.0, DEPTH, 0.7e-3, [(1, 1.4), (1.4, 2), (2, 3), (3, 4), (4, 5.5), (5.5, 11)]),
-        ("human_2_7MHz", 0.5, 120e-3, 7e-3, [(12, 18), (18, 25), (25, 40), (40, 60), (60, 120)]),
-        pytest.param("mouse_40MHz", 0.5, DEPTH, 0.7e-3, [(1, 2), (2, 4), (4, 11)], marks=pytest.mark.slow),
-        pytest.param("rat_15MHz", 0.5, 18e-3, 1.1e-3, [(1.7, 3.4), (3.4, 6.7), (6.7, 18)], marks=pytest.mark.slow),
-        pytest.param("human_3MHz", 0.0, 132e-3, 7e-3, [(12, 24), (48, 72)], marks=pytest.mark.slow),
+        pytest.param("human_2_7MHz", 0.5, 120e-3, 7e-3, [(12, 18), (25, 40), (60, 120)], marks=pytest.mark.slow),
+        pytest.param("mouse_40MHz", 0.5, DEPTH, 0.7e-3, [(1, 2), (4, 11)], marks=pytest.mark.slow),
+        pytest.param("rat_15MHz", 0.5, 18e-3, 1.1e-3, [(1.7, 3.4), (6.7, 18)], marks=pytest.mark.slow),
     ],
 )
 def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges(preset, attenuation, depth, beside, bands):
@@ -191,7 +188,7 @@ def test_bytes_do_not_depend_on_threads(elevation):
     assert results[0] == results[1]
 
 
-@pytest.mark.parametrize("elements", [2, 17, 33])
+@pytest.mark.parametrize("elements", [2, 17])
 def test_every_pair_is_filled_whatever_the_number_of_elements(elements):
     position, amplitude = sector(10)
     assert error(Probe(elements=elements), position, amplitude) < 2e-5

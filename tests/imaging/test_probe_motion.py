@@ -161,6 +161,7 @@ def test_breaths_are_as_slow_as_the_size_of_an_animal_makes_them(still):
     assert np.allclose(moved, [1e-3 * np.sin(np.pi / 9) ** 2, 0, 0], rtol=1e-9, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_run_has_the_motion_in_stored_truth_and_in_what_is_read_of_it(tmp_path):
     drift = np.array([0.6e-3, -0.3e-3, 0]) * np.arange(finished_repository.FRAMES)[:, None] / finished_repository.FRAMES
     view = View(angle_deg=10.0, motion=ViewMotion(drift=Excursion(lateral_mm=0.6, axial_mm=-0.3)))

@@ -141,7 +141,7 @@ def correlation(still, moved, lag):
     return np.corrcoef(*(part.ravel() for part in parts))[0, 1]
 
 
-def recovered_shift(depth, pivot, shift, blocks=24, **keys):
+def recovered_shift(depth, pivot, shift, blocks=16, **keys):
     """Lateral motion of speckle over that of its scatterers, by the correlation of the images of blocks."""
     rf = Rf(lines=TURN_LINES, sector_deg=18, elevation_beam=False, **keys)
     scanner = Scanner(Probe(elements=32, pitch_um=92.0), rf, depth + 1e-3)

@@ -32,6 +32,7 @@ def fan(seed, number):
     return position, random.choice([-1.0, 1.0], number)
 
 
+@pytest.mark.slow
 def test_dense_speckle_is_fully_developed():
     """Envelope Rayleigh: mean over standard deviation sqrt(pi / (4 - pi)) = 1.91 (Wagner 1983).
 

@@ -34,7 +34,7 @@ def heart():
     mesh = {"circumferential_elements": 18, "longitudinal_elements": 6, "transmural_elements": 1}
     config = et.configure(
         geometry=mesh,
-        loop={"frames": 8},
+        loop={"frames": 6},
         mechanics={"regional": {"preset": "even", "contractility": TRUE}},
         tracking={"grid": 0.016},
     )

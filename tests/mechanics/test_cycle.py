@@ -81,6 +81,7 @@ def test_infarct_stretches_where_healthy_wall_shortens():
     assert fibre[region == 0].mean() < -0.08
 
 
+@pytest.mark.slow
 def test_heart_that_is_larger_by_a_factor_moves_alike():
     """What has a length apart from the shape, springs and dashpots over an area, is scaled too."""
     factor, support = 1.3, CONFIG.mechanics.pericardium
@@ -129,6 +130,7 @@ def test_heart_that_cannot_be_filled_is_told_a_volume_and_a_size_that_work():
         beat(configure(small, **remedy))
 
 
+@pytest.mark.slow
 def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_how_far_it_may_eject():
     active = {"length_dependence": 2.0}
     config = CONFIG.model_copy(update={"loop": Loop(frames=20, esv_uL=6.0), "mechanics": Mechanics(active=active)})
@@ -139,6 +141,7 @@ def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_how_far_it_may_e
     assert borne["active_tension"].max() < 200e3
 
 
+@pytest.mark.slow
 def test_muscle_that_works_against_itself_is_told_the_share_that_does_not():
     even = Config(
         geometry=COARSE, loop=Loop(frames=12), mechanics={"active": {"normal_share": 0.35, "sheet_share": 0.35}}

@@ -146,6 +146,7 @@ def test_a_scar_is_taut_and_the_muscle_away_from_it_weakens(hemisphere):
     assert set(hemisphere.with_(remote_tension_scale=0.7).tension_scale) == {1.0}  # remote from nothing
 
 
+@pytest.mark.slow
 def test_a_thin_scar_has_its_thickness_and_leaves_the_cavity_and_the_base_where_they_are(hemisphere):
     infarct = Infarct(segments=[8, 9, 10], thickness_scale=0.5)
     mesh, before = thinned(hemisphere.mesh, infarct), hemisphere.mesh

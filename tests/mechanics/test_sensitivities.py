@@ -9,7 +9,7 @@ from echotruth.loop.cycle import read_loop
 
 COARSE = {"circumferential_elements": 6, "longitudinal_elements": 4, "transmural_elements": 1}
 # Changes so small that no step of the load is halved in one heart and not in the next.
-HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 12, "esp_mmHg": 100.0})
+HEART = et.configure(geometry=COARSE | {"wall_mm": 1.0}, loop={"frames": 8, "esp_mmHg": 100.0})
 FILLED = et.configure(HEART, **{"mechanics.material.stiffness_kPa": 1.2})
 INFARCT = et.configure(HEART, pathology={"infarct": {"segments": [8, 9], "tension_scale": 0.1}})
 SCAR = et.configure(INFARCT, pathology={"infarct": {"taut_stiffness_kPa": 100.0, "thickness_scale": 0.8}})
@@ -82,6 +82,7 @@ def test_heart_with_a_scar_fills_to_its_loop_as_its_derivatives_say(config, key,
         assert np.linalg.norm(found - expected) <= 5e-3 * np.linalg.norm(expected), name
 
 
+@pytest.mark.slow
 def test_systole_alone_ends_as_the_whole_cycle_does():
     few = et.configure(HEART, loop={"frames": 10})
     whole, systole = et.beat(few), et.beat(few, frames=et.systole(few))
@@ -114,7 +115,7 @@ def test_what_is_no_parameter_is_refused(parameters, message):
     [
         ({"loop.kind": "circulation"}, None, ValueError, "loop.kind = circulation: only a measured"),
         ({"motion.kind": "rigid"}, None, ValueError, "motion.kind = rigid: only a beat"),
-        ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 12"),
+        ({}, [1, 2], ValueError, r"frames = \[1, 2\]: give 0 and frames after it, in their order, below 8"),
     ],
 )
 def test_hearts_of_which_no_derivative_can_be_taken_are_refused(keys, frames, error, message):

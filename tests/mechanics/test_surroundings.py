@@ -95,6 +95,7 @@ def test_tangent_of_everything_together_is_the_derivative_of_the_forces(monkeypa
     equations.close()
 
 
+@pytest.mark.slow
 def test_pericardium_is_at_rest_at_end_diastole_and_takes_up_work_after_it():
     loop = Loop(frames=10)
     pericardium = {"spring_kPa_per_mm": 5.0, "dashpot_kPa_s_per_mm": 0.01}

@@ -1,6 +1,7 @@
 """What is inferred, in the store: of a repository whose jobs are all done, with draws that are known."""
 
 import shutil
+from functools import partial
 
 import finished_repository as finished
 import numpy as np
@@ -19,7 +20,8 @@ from echotruth.repository.reader import Repository
 from echotruth.repository.version import version_of
 from echotruth.workflow.job import Job
 
-CONFIG = finished.configured(motion=Motion(), inference=Inference(tracker="one"))
+configured = partial(finished.configured, views=("mid",), motion=Motion())
+CONFIG = configured(inference=Inference(tracker="one"))
 CASES = [case.id for case in expand(CONFIG)]
 SEEN = schema.observations(CONFIG)
 
@@ -79,11 +81,11 @@ def test_damage_to_what_was_inferred_is_found(folder, tmp_path):
 def test_version_is_that_of_the_section_and_of_all_that_was_tracked():
     trackers = {name: PhaseCorrelation(window_px=16) for name in ("one", "two")}
     others = [
-        finished.configured(motion=Motion(), tracking=Tracking(trackers=trackers), inference=Inference(tracker="two")),
-        finished.configured(motion=Motion(), views=("mid",), inference=Inference(tracker="one")),
-        finished.configured(motion=Motion(), inference=Inference(tracker="one", size_px=finished.SIZE)),
-        finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": [75, 3]})),
-        finished.configured(motion=Motion(), inference=Inference(tracker="one", prior={"fibres.endo_deg": None})),
+        configured(tracking=Tracking(trackers=trackers), inference=Inference(tracker="two")),
+        configured(views=("mid", "long_axis"), inference=Inference(tracker="one")),
+        configured(inference=Inference(tracker="one", size_px=finished.SIZE)),
+        configured(inference=Inference(tracker="one", prior={"fibres.endo_deg": [75, 3]})),
+        configured(inference=Inference(tracker="one", prior={"fibres.endo_deg": None})),
     ]
     hashes = [version_of("inference", config) for config in (CONFIG, *others)]
     assert len(set(hashes)) == len(hashes)
@@ -109,7 +111,7 @@ def test_table_has_a_row_for_each_heart_and_parameter_that_was_inferred(folder):
 
 def test_without_a_tracker_nothing_is_inferred(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / "small")
-    without = finished.configured(motion=Motion())
+    without = configured()
     assert finished.remake(copy, without) == ["repository"] and inferred.table(Repository(copy)).empty
 
 

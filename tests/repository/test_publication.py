@@ -84,6 +84,7 @@ def test_a_wider_bound_images_what_it_decides_otherwise_and_nothing_else(folder)
     assert list(et.Repository(folder).cases["status"]) == ["complete", "complete", "failed"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("swept", "statuses"),
     [

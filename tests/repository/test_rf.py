@@ -100,6 +100,7 @@ def test_whole_numbers_are_half_a_step_off_at_most():
     assert quantise(np.zeros((1, 1, 4), np.float32))[0].max() == 0
 
 
+@pytest.mark.slow
 def test_channels_are_there_if_they_are_kept(rf_repository):
     with_channels, without = set(opened(rf_repository()).variables), set(opened(rf_repository([])).variables)
     assert with_channels - without == {"channels", "channels_step", "transmitter", "receiver", "sample"}

@@ -27,6 +27,7 @@ def test_names_stand_once_in_a_group_and_labels_belong_to_coordinates():
     assert set(schema.LABELS) <= set(schema.COORDINATES)
 
 
+@pytest.mark.slow
 def test_finished_repository_has_the_arrays_of_the_schema_and_no_others(finished):
     store, seen = zarr.open_group(next(finished.glob("*.zarr")), mode="r", use_consolidated=False), set()
     for path, group in store.members(max_depth=None):
@@ -46,6 +47,7 @@ def test_finished_repository_has_the_arrays_of_the_schema_and_no_others(finished
     assert seen == {kind for kind in schema.KINDS if not kind.startswith("inference/")}
 
 
+@pytest.mark.slow
 def test_every_array_is_in_a_finished_repository_but_for_those_that_are_asked_for(finished):
     store = next(finished.glob("*.zarr"))
     found = {path.parent.name for path in store.rglob("zarr.json")}
@@ -54,6 +56,7 @@ def test_every_array_is_in_a_finished_repository_but_for_those_that_are_asked_fo
     assert [name for name in wanted if name not in found and not name.startswith(asked)] == []
 
 
+@pytest.mark.slow
 def test_clip_lists_all_groups_and_arrays_that_it_holds(finished):
     clips = list(finished.glob("*.zarr/clips/*/*/"))
     for clip in clips:

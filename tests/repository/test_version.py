@@ -48,7 +48,7 @@ def test_imports_that_are_found_are_those_of_the_parser():
 LOADED = "import {script}, sys; print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('echotruth')))"
 
 
-@pytest.mark.parametrize("stage", ["bmode", "tracking"])
+@pytest.mark.parametrize("stage", ["bmode", pytest.param("tracking", marks=pytest.mark.slow)])
 def test_modules_that_a_script_loads_are_counted_but_for_those_that_the_passing_ones_load(stage):
     def loaded(script):
         run = [sys.executable, "-c", LOADED.format(script=script)]

@@ -155,13 +155,6 @@ def test_path_is_all_steps_up_to_the_frame(page):
     assert lengths == [lengths[0] * (frame + 1) for frame in range(FRAMES)]
 
 
-def test_unknown_case_is_said_in_a_sentence(opened):
-    page = opened("?case=nobody&frame=0")
-    wait(page, f"({MODEL})('message').visible")
-    assert page.evaluate(f"({MODEL})('message').text").startswith("There is no case &#x27;nobody&#x27; here: ")
-    page.close()
-
-
 GEOMETRY = """() => {
     const frames = ["figure_first", "figure_second"].map(name => Bokeh.documents[0].get_model_by_name(name))
         .filter(figure => figure.visible).map(figure => Bokeh.index.find_one(figure));

@@ -179,6 +179,7 @@ def test_tracker_that_fails_everywhere_ends_with_status_1(folder, evaluate):
     assert (scores(folder, "custom_nowhere")["nrmse_all_percent"] == 100).all()
 
 
+@pytest.mark.slow
 def test_program_and_method_of_ours_are_tried_too(folder, evaluate):
     Path("program.py").write_text(PROGRAM)
     command = f"'{sys.executable}' program.py {{input}} {{output}}"
@@ -189,6 +190,7 @@ def test_program_and_method_of_ours_are_tried_too(folder, evaluate):
     assert et.Repository(folder).config.tracking.trackers["dis"] == Dis(preset="fast")
 
 
+@pytest.mark.slow
 def test_tracker_of_the_configuration_leaves_the_bytes_that_it_leaves_by_the_command_in_any_number_of_processes(
     folder, evaluate
 ):
@@ -199,6 +201,7 @@ def test_tracker_of_the_configuration_leaves_the_bytes_that_it_leaves_by_the_com
         assert found[0] and found[0] == found[1]
 
 
+@pytest.mark.slow
 def test_later_evaluation_replaces_its_own_groups_and_touches_no_others(folder, evaluate):
     for name, tracker in (("one", "custom:still"), ("two", "custom:still"), ("one", "custom:drawn")):
         before = content(folder)
@@ -230,12 +233,14 @@ def added(tmp_path, evaluate):
     return folder
 
 
+@pytest.mark.slow
 def test_repository_with_an_added_tracker_is_one_made_at_once_with_that_tracker(added, tmp_path):
     together = finish(tmp_path / "together", SMALL.model_copy(update={"tracking": TOGETHER}), tracked_by_mine)
     assert content(added) == content(together)
     assert remake(added, SMALL) == []
 
 
+@pytest.mark.slow
 def test_run_makes_an_added_tracker_again_for_other_images(added):
     (case,), bmode = expand(SMALL), SMALL.bmode.model_copy(update={"dynamic_range_dB": 50.0})
     made = remake(added, SMALL.model_copy(update={"bmode": bmode}), tracked_by_mine)
@@ -243,6 +248,7 @@ def test_run_makes_an_added_tracker_again_for_other_images(added):
     assert not check(added).faults
 
 
+@pytest.mark.slow
 def test_tracker_that_the_configuration_has_by_now_is_its_own(added, evaluate):
     config = SMALL.model_copy(update={"tracking": Tracking(trackers={"mine": Dis()})})
     remake(added, config)
@@ -252,6 +258,7 @@ def test_tracker_that_the_configuration_has_by_now_is_its_own(added, evaluate):
     assert et.Repository(added).config.tracking.trackers["mine"] == Dis()
 
 
+@pytest.mark.slow
 def test_tracker_that_ends_its_process_is_told_in_one_sentence_and_leaves_the_repository_as_it_was(folder, evaluate):
     before = content(folder)
     status, _, errors = evaluate("--tracker", "custom:second_crashes", "--view", "mid")
@@ -260,6 +267,7 @@ def test_tracker_that_ends_its_process_is_told_in_one_sentence_and_leaves_the_re
     assert content(folder) == before and not check(folder).faults
 
 
+@pytest.mark.slow
 def test_tracker_that_crashes_under_the_name_of_one_that_was_added_leaves_that_one_its_settings(added, evaluate):
     before = content(added), (added / "trackers.yaml").read_bytes()
     Path("began").write_text("by another process")

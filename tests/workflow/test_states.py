@@ -36,15 +36,14 @@ GROWN = {
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory, finished):
-    """Function from what a job makes to the folder of the repository that was made at once."""
-    folder = tmp_path_factory.mktemp("made") / "finished"
-    finish(folder, FINISHED)
-    return lambda result: folder if result is blank else finished
+def made(tmp_path_factory):
+    """The repository that was made at once, of arrays that are made up."""
+    return finish(tmp_path_factory.mktemp("made") / "finished", FINISHED)
 
 
-@pytest.mark.parametrize(("order", "result"), [(0, blank), pytest.param(2, solved, marks=pytest.mark.slow)])
-def test_repository_that_grew_in_any_order_is_one_that_was_made_at_once(made, tmp_path, order, result):
+@pytest.mark.slow
+@pytest.mark.parametrize(("order", "result", "whole"), [(0, blank, "made"), (2, solved, "finished")])
+def test_repository_that_grew_in_any_order_is_one_that_was_made_at_once(request, tmp_path, order, result, whole):
     left, steps = dict(GROWN), sorted(GROWN)
     random.Random(order).shuffle(steps)
     finish(tmp_path / "finished", smaller(**left), result)
@@ -52,7 +51,7 @@ def test_repository_that_grew_in_any_order_is_one_that_was_made_at_once(made, tm
         del left[section]
         done = remake(tmp_path / "finished", smaller(**left), result)
         assert len(done) > 1 and not (section != "cases" and any("mechanics" in job for job in done))
-    assert content(tmp_path / "finished") == content(made(result))
+    assert content(tmp_path / "finished") == content(request.getfixturevalue(whole))
 
 
 def test_merged_repositories_are_one_that_was_made_at_once(made, tmp_path):
@@ -64,7 +63,7 @@ def test_merged_repositories_are_one_that_was_made_at_once(made, tmp_path):
     plan = plan_of(tmp_path / "finished", FINISHED)
     assert merge(plan, [tmp_path / "60.0", tmp_path / "70.0"]) == 2 + 2 * 2
     assert remake(tmp_path / "finished", FINISHED) == ["repository"]
-    assert content(tmp_path / "finished") == content(made(blank)) and content(tmp_path / "60.0") == before
+    assert content(tmp_path / "finished") == content(made) and content(tmp_path / "60.0") == before
 
 
 ONE = configured(views=("mid",), cases={})
@@ -129,7 +128,7 @@ def in_process(folder, last):
 
 def test_run_that_is_killed_anywhere_is_one_that_went_on(one, tmp_path):
     folder, killed, numbers = tmp_path / "small", 0, random.Random(8)
-    while killed < 5:
+    while killed < 4:
         if in_process(folder, numbers.randint(1, EVENTS)) == -signal.SIGKILL:
             killed += 1
         elif not numbers.randrange(2):  # it is whole: lose a job of it
@@ -142,6 +141,7 @@ def test_run_that_is_killed_anywhere_is_one_that_went_on(one, tmp_path):
     assert content(folder) == one and not any((folder / "drafts").glob("*"))
 
 
+@pytest.mark.slow
 def test_changed_log_compression_makes_images_and_tracks_anew_which_are_those_of_it(finished, tmp_path):
     folder = copytree(finished, tmp_path / "finished", ignore=shutil.ignore_patterns(".lock"))
     for number, path in enumerate(folder.rglob("*")):  # a copy by other means
