@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.probe import pulse_spectrum
+from echotruth.units import mm
 
 Spectra = NDArray[np.complexfloating[Any, Any]]
 
@@ -64,7 +65,7 @@ def to_pymust(
     """Likeness of one transmit, PyMUST in three dimensions (`elevation`), with points for elements or with a `lens`."""
     probe = (array.probe if lens else array.thin)(attenuation_dB_per_cm_MHz=attenuation)
     position, amplitude = array.scatterers(SCATTERERS, thick=lens)
-    matrix, focus = FullMatrix(probe, array.far, elevation=lens), probe.si().elevation_focus
+    matrix, focus = FullMatrix(probe, array.far, elevation=lens), probe.elevation_focus_mm * mm
     delay = delays(probe, (focus * np.sin(STEERED), focus * np.cos(STEERED)))
     phase = np.exp(-2j * np.pi * np.outer(matrix.frequency, delay))
     ours = np.einsum("fij,fi->fj", matrix(position, amplitude), phase)

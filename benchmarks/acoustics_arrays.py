@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.config import Probe
+from echotruth.units import MHz, um
 
 Floats = NDArray[np.float64]
 
@@ -48,8 +49,8 @@ class Array:
 
     def thin(self, **changes: Any) -> Probe:
         """The probe with elements that are points in elevation."""
-        p = self.probe().si()
-        return self.probe(height_mm=1e3 * THIN * p.sound_speed / p.frequency, **changes)
+        probe = self.probe()
+        return self.probe(height_mm=1e3 * THIN * probe.sound_speed_m_per_s / (probe.frequency_MHz * MHz), **changes)
 
     def scatterers(self, number: int, *, thick: bool = False) -> tuple[Floats, Floats]:
         """Positions (number, 3; lateral, axial, elevation; m) and amplitudes (number,) of scatterers in the sector.
@@ -72,7 +73,6 @@ ARRAYS = {
 
 def delays(probe: Probe, focus: tuple[float, float]) -> Floats:
     """Delays that focus at lateral and axial coordinates (m), not negative, shape (elements,), s."""
-    p = probe.si()
-    centre = (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
-    flight = np.hypot(focus[0] - centre, focus[1]) / p.sound_speed
+    centre = (np.arange(probe.elements) - (probe.elements - 1) / 2) * (probe.pitch_um * um)
+    flight = np.hypot(focus[0] - centre, focus[1]) / probe.sound_speed_m_per_s
     return flight.max() - flight

@@ -14,6 +14,7 @@ from exact_sum import Spectra, exact_matrix, one_way
 from echotruth.config import Probe
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
+from echotruth.units import mm
 
 SCATTERERS, EVERY = 150, 8
 """Scatterers, and the bins that are summed: one in so many."""
@@ -27,7 +28,7 @@ def with_delay_twice(probe: Probe, position: Floats, amplitude: Floats, frequenc
     PyMUST 0.1.9 adds it. Shape (bins, elements, elements).
     """
     lateral, (_, axial, elevation) = position[:, 0] - element_centres(probe)[:, None], position.T
-    delay = elevation**2 / 2 / np.sqrt(lateral**2 + axial**2 + elevation**2) / probe.si().sound_speed
+    delay = elevation**2 / 2 / np.sqrt(lateral**2 + axial**2 + elevation**2) / probe.sound_speed_m_per_s
     waves = (one_way(probe, position, f) * np.exp(-2j * np.pi * f * delay) for f in frequency)
     pulse = pulse_spectrum(probe, frequency)
     return np.array([p * (wave * amplitude) @ wave.T for p, wave in zip(pulse, waves, strict=True)])
@@ -89,7 +90,7 @@ def pymust(array: Array, *, thick: bool = False, twice: bool = False, **options:
     """Relative L2 error of PyMUST against the exact sum or that of :func:`with_delay_twice`."""
     probe = (array.probe if thick else array.thin)()
     position, amplitude = array.scatterers(SCATTERERS, thick=thick)
-    ours, delay = FullMatrix(probe, array.far, elevation=thick), delays(probe, (0.0, probe.si().elevation_focus))
+    ours, delay = FullMatrix(probe, array.far, elevation=thick), delays(probe, (0.0, probe.elevation_focus_mm * mm))
     bins = ours.first_bin + np.arange(0, len(ours.frequency), EVERY)
     step = ours.sampling / ours.samples
     theirs = Pymust(probe, **options).spectra(position, amplitude, delay, bins, step)

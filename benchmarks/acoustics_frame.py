@@ -16,6 +16,7 @@ from echotruth.imaging.beamforming.synthesis import TransmitSynthesis
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
 from echotruth.imaging.bmode import bmode_clip
 from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.units import MHz, mm
 
 Seconds = dict[str, dict[str, float]]
 
@@ -32,9 +33,9 @@ def frame(
     """Seconds of the parts of a frame, from scatterers to uint8; medians; `probe` and `changes` replace keys."""
     setup = ARRAYS[array]
     array_, (rf, bmode) = setup.probe(**(probe or {})), scan(setup, **changes)
-    scanner = Scanner(array_, rf, bmode.si().field_of_view)
+    scanner = Scanner(array_, rf, bmode.field_of_view_mm * mm)
     channels = TransmitSynthesis(
-        scanner.matrix, array_.si().frequency, TRANSMIT_SEQUENCES[rf.transmit](array_, rf, scanner.scan)
+        scanner.matrix, array_.frequency_MHz * MHz, TRANSMIT_SEQUENCES[rf.transmit](array_, rf, scanner.scan)
     )
     phantom = setup.scatterers(scatterers, thick=True)
     turns = [_parts(scanner, channels, phantom, bmode).seconds for _ in range(repeats + 1)][1:]
@@ -46,7 +47,7 @@ def lines(array: str, scatterers: int, probe: dict[str, Any], **changes: Any) ->
     setup = ARRAYS[array]
     rf, bmode = scan(setup, **changes)
     return len(
-        Scanner(setup.probe(**probe), rf, bmode.si().field_of_view).lines(*setup.scatterers(scatterers, thick=True))
+        Scanner(setup.probe(**probe), rf, bmode.field_of_view_mm * mm).lines(*setup.scatterers(scatterers, thick=True))
     )
 
 
@@ -75,7 +76,8 @@ def transmits(array: str, scatterers: int, number: int, repeats: int) -> Seconds
     probe, rf = setup.probe(), scan(setup, transmit="diverging", transmits=number)[0]
     waves = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, scan_lines(probe, rf))
     full = FullMatrix(probe, setup.far, np.abs(waves.delay).max(), elevation=False)
-    phantom, channels, turns = setup.scatterers(scatterers), TransmitSynthesis(full, probe.si().frequency, waves), []
+    phantom, turns = setup.scatterers(scatterers), []
+    channels = TransmitSynthesis(full, probe.frequency_MHz * MHz, waves)
     for _ in range(repeats + 1):
         clock = Clock()
         with clock("matrix"):

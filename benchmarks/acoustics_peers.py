@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from echotruth.config import Probe
 from echotruth.imaging.rf.probe import spectral_width
+from echotruth.units import MHz, mm, um
 
 Floats = NDArray[np.float64]
 
@@ -52,21 +53,20 @@ class Pymust:
     def __init__(self, probe: Probe, *, elevation: bool = False, changes: dict[str, Any] | None = None, **options: Any):
         import pymust
 
-        p = probe.si()
         self._simus, self._pulse, self._elevation = pymust.simus, pymust.getpulse, elevation
         self.param, self.options = pymust.utils.Param(), pymust.utils.Options()
         fields = {
-            "fc": p.frequency,
-            "pitch": p.pitch,
-            "width": p.width,
-            "height": p.height,
-            "focus": p.elevation_focus,
+            "fc": probe.frequency_MHz * MHz,
+            "pitch": probe.pitch_um * um,
+            "width": probe.width_um * um,
+            "height": probe.height_mm * mm,
+            "focus": probe.elevation_focus_mm * mm,
             "radius": np.inf,
             "bandwidth": 100 * probe.bandwidth,
             "baffle": "soft",
             "attenuation": probe.attenuation_dB_per_cm_MHz * NEPER_DB * np.log(10) / 20,
-            "c": p.sound_speed,
-            "Nelements": p.elements,
+            "c": probe.sound_speed_m_per_s,
+            "Nelements": probe.elements,
         }
         for name, value in (fields | (changes or {})).items():
             setattr(self.param, name, value)
@@ -148,16 +148,15 @@ class Esdiva:
     def __init__(self, probe: Probe, sampling: float, patches: int = 1):
         import esdiva
 
-        p = probe.si()
         shape = {
-            "n_elements": p.elements,
-            "element_width_mm": 1e3 * p.width,
-            "element_height_mm": 1e3 * p.height,
-            "kerf_mm": 1e3 * (p.pitch - p.width),
+            "n_elements": probe.elements,
+            "element_width_mm": probe.width_um / 1e3,
+            "element_height_mm": probe.height_mm,
+            "kerf_mm": (probe.pitch_um - probe.width_um) / 1e3,
             "no_sub_x": 1,
             "no_sub_y": patches,
-            "elevation_focus_mm": 1e3 * p.elevation_focus if patches > 1 else None,
-            "frequency_Hz": p.frequency,
+            "elevation_focus_mm": probe.elevation_focus_mm if patches > 1 else None,
+            "frequency_Hz": probe.frequency_MHz * MHz,
         }
         with open(os.devnull, "w") as nowhere, contextlib.redirect_stdout(nowhere):
             ends = [esdiva.transducers.LinearArrayTransducer(**shape) for _ in range(2)]
@@ -166,9 +165,10 @@ class Esdiva:
         half = int(TRUNCATION / (2 * np.pi * spectral_width(probe)) * sampling)
         self._time = np.arange(-half, half + 1) / sampling
         self._pulse = pulse(probe, self._time)
-        self._reception = esdiva.Reception(*ends, c=p.sound_speed, fs=sampling, excitation=self._pulse, verbose=False)
+        speed = probe.sound_speed_m_per_s
+        self._reception = esdiva.Reception(*ends, c=speed, fs=sampling, excitation=self._pulse, verbose=False)
         # rho / (2 c^2) is its factor on the echo, width height / (2 pi) that of each way.
-        self._size = (p.width * p.height / 2 / np.pi) ** 2 / 2 / p.sound_speed**2
+        self._size = (probe.width_um * um * probe.height_mm * mm / 2 / np.pi) ** 2 / 2 / speed**2
 
     def __call__(self, position: Floats, amplitude: Floats, delay: Floats) -> tuple[Any, dict[str, Any]]:
         """RF of one transmit (1, elements, samples), and its time axis."""

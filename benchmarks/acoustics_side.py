@@ -19,6 +19,7 @@ from acoustics_peers import PATCHES, Esdiva, Pymust
 from worker import Clock, serve
 
 from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.units import MHz, mm
 
 Run = Callable[[Floats, Floats], Any]
 
@@ -55,12 +56,12 @@ def esdiva_matrix(array: Array, elements: int) -> Run:
 
 def _esdiva(array: Array, elements: int, patches: int) -> Esdiva:
     probe = array.probe(elements=elements)
-    return Esdiva(probe, probe.si().sampling, patches)
+    return Esdiva(probe, probe.sampling_MHz * MHz, patches)
 
 
 def _focused(array: Array, elements: int) -> Floats:
     probe = array.probe(elements=elements)
-    return delays(probe, (0.0, probe.si().elevation_focus))
+    return delays(probe, (0.0, probe.elevation_focus_mm * mm))
 
 
 PARTIES: dict[str, tuple[Callable[..., Run], dict[str, Any]]] = {

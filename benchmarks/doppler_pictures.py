@@ -33,6 +33,7 @@ from echotruth.imaging.view import before_probe
 from echotruth.report import style
 from echotruth.repository.datasets import as_stored, clip_dataset
 from echotruth.seeds import generator
+from echotruth.units import MHz, mm
 
 FRAMES, SIZE = 40, 512
 SPECIES, VIEWS = ("mouse", "human"), ("mid", "four_chamber")
@@ -117,9 +118,9 @@ def _statistics(found: xr.Dataset, inner: NDArray[np.bool_]) -> list[str]:
 
 def _far_from_border(heart: et.Heart, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     assert heart.config
-    probe, pixel = heart.config.probe.si(), heart.config.bmode.si().field_of_view / SIZE
+    probe, pixel = heart.config.probe, heart.config.bmode.field_of_view_mm * mm / SIZE
     distance: NDArray[np.float64] = distance_transform_edt(mask) * pixel
-    return distance > FROM_BORDER * probe.sound_speed / probe.frequency
+    return distance > FROM_BORDER * probe.sound_speed_m_per_s / (probe.frequency_MHz * MHz)
 
 
 def draw(heart: et.Heart) -> Figure:
@@ -148,7 +149,7 @@ def _figure(
     figure = style.figure(9.0, 6.0)
     grid = figure.add_gridspec(2, len(panels), height_ratios=(1.5, 1))
     limit = 2 * np.ceil(50 * np.nanmax(np.abs(panels["True"][1])))
-    scale, half = Normalize(-limit, limit), 500 * heart.config.bmode.si().field_of_view
+    scale, half = Normalize(-limit, limit), 500 * (heart.config.bmode.field_of_view_mm * mm)
     for column, (name, (image, velocity)) in enumerate(panels.items()):
         axes = figure.add_subplot(grid[0, column])
         extent = (-half, half, 2 * half, 0)

@@ -22,6 +22,7 @@ from echotruth.config import Probe
 from echotruth.imaging.flow import fresnel
 from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum
 from echotruth.imaging.rf.shadow import Rib
+from echotruth.units import MHz, um
 
 Spectra = NDArray[np.complex128]
 
@@ -60,19 +61,19 @@ def exact_matrix(
     passes = rib.transmission(position, element_centres(probe)).T if rib else 1.0
     waves = (passes * one_way(probe, position, f, elevation=elevation) for f in frequency)
     pulse = pulse_spectrum(probe, frequency)
-    scattered = (amplitude * (f / probe.si().frequency) ** exponent for f in frequency)
+    scattered = (amplitude * (f / (probe.frequency_MHz * MHz)) ** exponent for f in frequency)
     return np.array([p * (wave * a) @ wave.T for p, a, wave in zip(pulse, scattered, waves, strict=True)])
 
 
 def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool = True) -> Spectra:
     """Wave u of every element at every scatterer (n, 3), m, at a frequency, Hz: (elements, scatterers), 1/m."""
-    p = probe.si()
+    speed = probe.sound_speed_m_per_s
     lateral = position[:, 0] - element_centres(probe)[:, None]
     distance = np.sqrt(lateral**2 + position[:, 1] ** 2 + position[:, 2] ** 2)
     # NumPy's sinc(x) is sin(pi x) / (pi x).
-    directivity = np.sinc(p.width * frequency / p.sound_speed * lateral / distance) * position[:, 1] / distance
+    directivity = np.sinc(probe.width_um * um * frequency / speed * lateral / distance) * position[:, 1] / distance
     attenuation = probe.attenuation_dB_per_cm_MHz * 100 / 1e6 * np.log(10) / 20  # nepers per metre and hertz
-    wave = directivity * np.exp(-(attenuation + 2j * np.pi / p.sound_speed) * frequency * distance) / distance
+    wave = directivity * np.exp(-(attenuation + 2j * np.pi / speed) * frequency * distance) / distance
     return wave * fresnel(probe, position, frequency) if elevation else wave
 
 

@@ -22,6 +22,7 @@ from echotruth.mechanics.solver.equilibrium import Equilibrium, Load
 from echotruth.mechanics.solver.newton import LoadStepper
 from echotruth.mechanics.solver.support import base_support
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall, wall_law
+from echotruth.units import kPa
 
 PAPERS = load(Path(__file__).parents[1] / "config" / "paper.yaml")
 """The paper's heart, whose fibres pull along themselves alone and which nothing surrounds, as the peer's."""
@@ -77,7 +78,7 @@ class Ours:
         """Constants of the wall, but the stiffness; SI."""
         section, material = self._config.mechanics, self._config.mechanics.material
         exponents = {"fibre": material.fibre, "transverse": material.transverse, "shear": material.shear}
-        return exponents | {"beta": section.active.length_dependence, "bulk_modulus": section.si().bulk_modulus}
+        return exponents | {"beta": section.active.length_dependence, "bulk_modulus": section.bulk_modulus_kPa * kPa}
 
     def base(self) -> str:
         """Support of the base."""

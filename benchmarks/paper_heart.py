@@ -19,6 +19,7 @@ from echotruth.evaluation.polar import resolve
 from echotruth.fem.volume import cell_volumes
 from echotruth.imaging.truth import cavity_centroid
 from echotruth.repository import estimates, schema
+from echotruth.units import mm
 
 if TYPE_CHECKING:
     import echotruth.heart
@@ -115,7 +116,7 @@ class Heart:
     @cached_property
     def field_of_view(self) -> float:
         """Side of the images, m."""
-        return self.read.config.bmode.si().field_of_view
+        return self.read.config.bmode.field_of_view_mm * mm
 
     @cached_property
     def mesh(self) -> echotruth.heart.Heart:

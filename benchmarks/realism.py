@@ -35,6 +35,7 @@ from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import wall_mask
 from echotruth.imaging.view import Plane, before_probe
+from echotruth.units import deg
 
 HERE = Path(__file__).parent
 CYCLE, FRAME_ED, ORIGIN = (6, 33), 22, (31, 84)
@@ -266,7 +267,7 @@ def our_pictures(config: Config, beating: Heart, plane: Plane) -> Iterator[Pictu
     images = bmode_clip(lines, scan=scanner.scan, range_=scanner.range, bmode=config.bmode, gain=gain)[SIZE]
     centres = pixel_centres(config.bmode, SIZE)
     axial, lateral = np.meshgrid(*centres, indexing="ij")
-    scan = np.abs(np.arctan2(lateral, axial)) < 0.98 * config.rf.si().sector / 2
+    scan = np.abs(np.arctan2(lateral, axial)) < 0.98 * (config.rf.sector_deg * deg) / 2
     mm = config.bmode.field_of_view_mm / SIZE * (1 if config.geometry.preset == "human" else 12.5)
     for index in range(0, len(SHOWN), 2):
         still = replace(beating, displacement=beating.displacement[[SHOWN[index]]])

@@ -32,6 +32,7 @@ from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.bmode import bmode_clip
 from echotruth.repository.reader import Repository
 from echotruth.tracking import grid, track
+from echotruth.units import mm, per_mm3
 
 RESULTS = Path(__file__).parent / "results"
 LOW, HIGH = np.array([-1.8e-3, 5.2e-3, -0.4e-3]), np.array([1.8e-3, 8.2e-3, 0.4e-3])
@@ -54,10 +55,10 @@ Clips = dict[int, np.ndarray]
 def blocks(config: Config, seed: int) -> Clips:
     """A block of speckle at every shift: image size to frames (shift, size, size), uint8."""
     random = np.random.default_rng(seed)
-    number = int(config.phantom.si().density * np.prod(HIGH - LOW))
+    number = int(config.phantom.density_per_mm3 * per_mm3 * np.prod(HIGH - LOW))
     position, amplitude = random.uniform(LOW, HIGH, (number, 3)), random.standard_normal(number)
     scanner = Scanner(config.probe, config.rf, 11e-3)
-    pixel = config.bmode.si().field_of_view / config.bmode.sizes[0]
+    pixel = config.bmode.field_of_view_mm * mm / config.bmode.sizes[0]
     moved = [position + shift * pixel * np.array([1.0, 1.0, 0.0]) for shift in SHIFTS]
     lines = np.stack([scanner.lines(each, amplitude) for each in moved])
     return bmode_clip(lines, scanner.scan, scanner.range, config.bmode)
@@ -65,7 +66,7 @@ def blocks(config: Config, seed: int) -> Clips:
 
 def wall(config: Config, size: int) -> np.ndarray:
     """Pixels (size, size) that are tracked."""
-    side = config.bmode.si().field_of_view
+    side = config.bmode.field_of_view_mm * mm
     lateral, axial = (np.arange(size) + 0.5) * side / size - side / 2, (np.arange(size)[:, None] + 0.5) * side / size
     left, right, near, far = WALL
     return (lateral > left) & (lateral < right) & (axial > near) & (axial < far)
@@ -78,7 +79,7 @@ def errors(config: Config, frames: np.ndarray, settings: Any) -> np.ndarray:
     places = places[wall(config, largest)[tuple(places.astype(int).T[::-1])]]
     scale = size / largest
     points = (places + 0.5) * scale - 0.5
-    given = points, wall(config, size), config.bmode.si().field_of_view / size, np.array([0.0, 1e-3]), 1
+    given = points, wall(config, size), config.bmode.field_of_view_mm * mm / size, np.array([0.0, 1e-3]), 1
     found = [track(frames[[0, k]], *given, settings)[0][1] for k in range(len(frames))]
     return np.stack(found) - SHIFTS[:, None, None] * scale
 

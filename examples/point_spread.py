@@ -12,7 +12,7 @@ line = np.abs(lines[np.abs(lines).max(axis=1).argmax()])
 fine = np.linspace(scanner.range[0], scanner.range[-1], 200_000)
 above = fine[np.interp(fine, scanner.range, line) > line.max() / 2]
 length = above[-1] - above[0]  # m, -6 dB
-p = probe.si()
+frequency = 1e6 * probe.frequency_MHz
 # A Gaussian spectrum of this -6 dB bandwidth has an envelope of that -6 dB length.
-due = p.sound_speed / 2 * 4 * np.log(2) / (np.pi * p.bandwidth * p.frequency)
+due = probe.sound_speed_m_per_s / 2 * 4 * np.log(2) / (np.pi * probe.bandwidth * frequency)
 print(f"-6 dB length of the echo {1e6 * length:.1f} um, of the pulse {1e6 * due:.1f} um")

@@ -31,6 +31,7 @@ from echotruth.tracking.ray_network import DILATIONS, LARGEST_DEVIATION, LEAST_D
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.bspline_cnn import CHANNELS, MIRRORED, ODD, on_rays, over_phases, ray_features
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
+from echotruth.units import mm
 
 WIDTH, BATCH, EPOCHS, DROPOUT = 64, 8, 60, 0.15
 FRACTIONS = {"train": 0.85, "test": 0.15}
@@ -88,7 +89,7 @@ def sample(name, heart, clip, step, reference):
     """Sample of a clip, of which every frame or every second is used."""
     config = heart.config
     images, mask, times = (clip[each].values for each in ("image", "mask", "time"))
-    spacing = config.bmode.si().field_of_view / mask.shape[-1]
+    spacing = config.bmode.field_of_view_mm * mm / mask.shape[-1]
     given = TrackerInput(images[::step], np.zeros((0, 2)), mask[0].astype(bool), spacing, times[::step], 0)
     settings = et.configure(config, tracking={"trackers": {"cnn": {"method": "bspline_cnn", "reference": reference}}})
     features, _ = ray_features(given, settings.tracking.trackers["cnn"])

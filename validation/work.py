@@ -12,6 +12,7 @@ from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradie
 from echotruth.mechanics.fibres import fibre_frames, material_gradients
 from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.report import style
+from echotruth.units import kPa, kPa_per_mm, kPa_s_per_mm
 from validation import energies, heart
 from validation.report import Report, Row
 
@@ -133,7 +134,7 @@ class _VirtualWork:
         """Energy of the mean dilatation of each cell."""
         unloaded = self.volume.sum(axis=1)
         dilatation = np.sum(energies.determinant(f) * self.volume, axis=1) / unloaded - 1
-        return self.section.si().bulk_modulus / 2 * np.sum(dilatation**2 * unloaded)
+        return self.section.bulk_modulus_kPa * kPa / 2 * np.sum(dilatation**2 * unloaded)
 
     def _viscous(self, f: Floats, frame: int) -> complex:
         """Potential of the viscous stress, viscosity / (2 dt) |E - E_previous|^2."""
@@ -141,21 +142,24 @@ class _VirtualWork:
         if previous.time <= 0:
             return 0j
         strain = (_right_cauchy_green(f) - _right_cauchy_green(self._before(frame))) / 2
-        viscosity = self.section.si().viscosity
+        viscosity = self.section.viscosity_Pa_s
         return viscosity / (2 * previous.time) * np.sum(np.sum(strain**2, axis=(-2, -1)) * self.volume)
 
     def _surroundings(self, u: Floats, change: Floats, frame: int) -> float:
         """Work against the pericardium, which rests at end-diastole, and against the springs of an elastic base."""
-        pericardium, base = self.section.pericardium.si(), self.section.elastic_base.si()
+        pericardium, base = self.section.pericardium, self.section.elastic_base
         work, at_ed = 0.0, self.beat.displacement[0]
         if frame:
             previous = self.previous_states[frame]
             rate = (u - self.displacement(previous.state.solution)) / previous.time
-            traction = pericardium.spring * (u - at_ed) + pericardium.dashpot * rate
+            traction = pericardium.spring_kPa_per_mm * kPa_per_mm * (u - at_ed)
+            traction += pericardium.dashpot_kPa_s_per_mm * kPa_s_per_mm * rate
             work += _surface_work(self.mesh, self.mesh.epi, traction, change, None)
         if self.section.base == "elastic":
-            work += _surface_work(self.mesh, self.mesh.base, base.axial_spring * u, change, "axial")
-            work += _surface_work(self.mesh, self.mesh.base, base.circumferential_spring * u, change, "circumferential")
+            axial = base.axial_spring_kPa_per_mm * kPa_per_mm
+            circumferential = base.circumferential_spring_kPa_per_mm * kPa_per_mm
+            work += _surface_work(self.mesh, self.mesh.base, axial * u, change, "axial")
+            work += _surface_work(self.mesh, self.mesh.base, circumferential * u, change, "circumferential")
         return work
 
 

@@ -41,6 +41,7 @@ from echotruth.repository.version import version_of
 from echotruth.seeds import generator
 from echotruth.tracking.closure import closure
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
+from echotruth.units import mm
 
 from .columns import ROTATION, packed_reliability, packed_segments
 from .hearts import SuiteCase, cases_of, suite_version, usable_heart
@@ -139,7 +140,7 @@ def _labels(config: Config, moving: Heart, plane: Plane) -> Labels:
 
 def clip_truth(config: Config, view: str, truth: Truth, labels: Labels) -> ClipTruth:
     """Truth of a view as the metrics of clips take it."""
-    unit, inside = config.bmode.si().field_of_view / SIDE, truth.inside
+    unit, inside = config.bmode.field_of_view_mm * mm / SIDE, truth.inside
     tissue = {
         name: values[grid_pixels(config)][inside] for name, values in unpack(labels[config.bmode.size_px]).items()
     }

@@ -1,4 +1,4 @@
-"""Base class of the sections of the configuration, and the units that their keys carry."""
+"""Base class of the sections of the configuration."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from itertools import pairwise
-from math import log, pi
 from textwrap import dedent
 from types import SimpleNamespace
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
@@ -26,33 +25,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
 
-UNITS: dict[str, float] = {
-    "um": 1e-6,
-    "ns": 1e-9,
-    "mm": 1e-3,
-    "per_mm3": 1e9,
-    "dB_per_cm_MHz": log(10) / 20 / 1e-2 / 1e6,  # nepers per metre and hertz
-    "uL": 1e-9,
-    "mL": 1e-6,
-    "m3": 1.0,
-    "ms": 1e-3,
-    "s": 1.0,
-    "per_min": 1 / 60,
-    "mmHg": 133.322387415,
-    "kPa": 1e3,
-    "Pa": 1.0,
-    "kPa_per_mm": 1e6,
-    "kPa_s_per_mm": 1e6,
-    "Pa_s": 1.0,
-    "MHz": 1e6,
-    "m_per_s": 1.0,
-    "g": 1e-3,
-    "mL_per_g": 1e-3,
-    "mL_per_min_per_g": 1e-3 / 60,
-    "deg": pi / 180,
-    "dB": 1.0,
-}
-"""Unit suffix of a key -> factor to SI (mmHg: NIST SP 811, appendix B.8)."""
+from echotruth.units import UNITS, unit_of
 
 Positive = Annotated[FiniteFloat, Field(gt=0, le=1e12)]
 """Bounded, so that no product of a few of them overflows."""
@@ -84,11 +57,6 @@ def check(method: Check) -> Check:
 def _checks(section: type[Section]) -> list[Callable[[Section], object]]:
     """The checks of a section, in the order in which they are written."""
     return [method for kind in reversed(section.mro()) for method in vars(kind).values() if hasattr(method, _CHECK)]
-
-
-def unit_of(key: str) -> str:
-    """Unit suffix of a configuration key; empty if it has none."""
-    return max((unit for unit in UNITS if key.endswith(f"_{unit}")), key=len, default="")
 
 
 @cache

@@ -7,6 +7,7 @@ import pytest
 from echotruth.config import Bmode, Config, Geometry, Probe, Rf, anatomy
 from echotruth.config.loading import ConfigError, validate
 from echotruth.config.transducers import ARRAY_PRESETS
+from echotruth.units import deg
 
 
 def configured(**sections):
@@ -22,7 +23,7 @@ def test_heart_stands_within_the_field_of_view_and_the_sector(species):
     along = 1.2 * ((size["endo_length_mm"] + size["base_mm"]) / 2 + size["apex_wall_mm"])
     focus, side = config.rf.focus_mm, config.bmode.field_of_view_mm
     assert max(across, along) < focus < side - max(across, along)
-    assert across < focus * config.rf.si().sector / 2
+    assert across < focus * (config.rf.sector_deg * deg) / 2
 
 
 @pytest.mark.parametrize("name", ARRAY_PRESETS)
@@ -30,22 +31,22 @@ def test_scan_of_a_preset_has_ten_scatterers_in_its_resolution_cell(name):
     """-6 dB widths of two ways: 4 ln 2 / (pi B) c / 2 in depth, 1.38 wavelengths F# of two Hann apertures, 0.886 in
     elevation, where sinc^2 is one half."""
     config = configured(probe={"preset": name})
-    probe, focus = config.probe.si(), config.rf.si().focus
-    wavelength = probe.sound_speed / probe.frequency
-    axial = 4 * log(2) / (pi * probe.bandwidth * probe.frequency) * probe.sound_speed / 2
-    length = probe.elements * probe.pitch
+    probe, focus = config.probe, config.rf.focus_mm
+    wavelength = probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3  # mm
+    axial = 4 * log(2) / (pi * probe.bandwidth) * wavelength / 2
+    length = probe.elements * probe.pitch_um / 1e3
     lateral = 1.38 * wavelength * max(focus / length, config.rf.f_number)
-    elevation = 0.886 * wavelength * probe.elevation_focus / probe.height
-    assert config.phantom.si().density * axial * lateral * elevation > 10
+    elevation = 0.886 * wavelength * probe.elevation_focus_mm / probe.height_mm
+    assert config.phantom.density_per_mm3 * axial * lateral * elevation > 10
 
 
 @pytest.mark.parametrize("name", ARRAY_PRESETS)
 def test_focal_zones_of_a_preset_lie_within_each_others_depth_of_field(name):
     config = configured(probe={"preset": name})
-    probe, rf = config.probe.si(), config.rf.si()
-    f_number = max(rf.focus / (probe.elements * probe.pitch), config.rf.f_number)
-    depth = 7 * probe.sound_speed / probe.frequency * f_number**2
-    assert depth / 3 < rf.focal_spacing < depth
+    probe, rf = config.probe, config.rf
+    f_number = max(1e3 * rf.focus_mm / (probe.elements * probe.pitch_um), rf.f_number)
+    depth = 7 * probe.sound_speed_m_per_s / probe.frequency_MHz / 1e3 * f_number**2  # mm
+    assert depth / 3 < rf.focal_spacing_mm < depth
 
 
 def test_default_is_the_mouse():

@@ -9,6 +9,7 @@ from echotruth.cases import expand, table
 from echotruth.config import Config
 from echotruth.config.building import configure
 from echotruth.config.loading import ConfigError, validate
+from echotruth.units import ms
 
 INFARCT, ORDER = "pathology.infarct", "pathology.activation"
 BAD = [
@@ -63,7 +64,7 @@ def test_sites_survive_writing_and_reading(written):
     sites = [{"azimuth_deg": 180, "depth": 1, "time_ms": 3}, {}]
     config = validate({"pathology": {"activation": {"sites": sites}}, "loop": {"kind": "circulation"}}, "late.yaml")
     assert validate(yaml.safe_load(written(config.model_dump(mode="json"))), "again.yaml") == config
-    assert [site.si().time for site in config.pathology.activation.sites] == [pytest.approx(3e-3), 0]
+    assert [site.time_ms * ms for site in config.pathology.activation.sites] == [pytest.approx(3e-3), 0]
 
 
 def test_a_wall_is_not_both_preset_and_paced():

@@ -7,6 +7,7 @@ from echotruth.config import Config
 from echotruth.config.building import configure
 from echotruth.config.loading import ConfigError, load
 from echotruth.config.realism import Realism
+from echotruth.section import value_of
 
 
 @pytest.mark.parametrize("tissue", ["blood", "surroundings"])
@@ -57,8 +58,7 @@ def test_realistic_configuration_is_ideal_without_one_key(name):
     assert realistic.probe.bandwidth < off.probe.bandwidth
     # A longer pulse, and as many scatterers in it and across the beam.
     density, frequency = (
-        getattr(realistic, section).si().__dict__[key] / getattr(off, section).si().__dict__[key]
-        for section, key in (("phantom", "density"), ("probe", "frequency"))
+        value_of(realistic, key) / value_of(off, key) for key in ("phantom.density_per_mm3", "probe.frequency_MHz")
     )
     assert density == pytest.approx(realistic.probe.bandwidth / off.probe.bandwidth * frequency**3, rel=1e-3)
 

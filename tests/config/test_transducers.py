@@ -21,20 +21,21 @@ def test_preset_is_sampled_to_the_faint_edge_of_its_pulse(name):
 
 def test_human_array_is_the_p4_2v():
     """Frequency, bandwidth, pitch, width, height and focus of PyMUST's getparam('P4-2v')."""
-    probe = Probe(preset="human_2_7MHz").si()
-    found = (probe.frequency, probe.bandwidth, probe.pitch, probe.width, probe.height, probe.elevation_focus)
-    assert found == pytest.approx((2.72e6, 0.74, 300e-6, 250e-6, 14e-3, 60e-3))
+    probe = Probe(preset="human_2_7MHz")
+    found = (probe.frequency_MHz, probe.bandwidth, probe.pitch_um, probe.width_um)
+    assert found == pytest.approx((2.72, 0.74, 300, 250))
+    assert (probe.height_mm, probe.elevation_focus_mm) == (14, 60)
     assert probe.elements == 64
 
 
 @pytest.mark.parametrize(
     "preset, elements, frequency, length",
-    [("human_3MHz", 80, 3e6, 20.3e-3), ("mouse_linear_40MHz", 256, 40e6, 14.1e-3)],
+    [("human_3MHz", 80, 3, 20.3e3), ("mouse_linear_40MHz", 256, 40, 14.1e3)],
 )
 def test_array_is_as_long_as_its_maker_says(preset, elements, frequency, length):
-    probe = Probe(preset=preset).si()
-    assert (probe.elements, probe.frequency) == (elements, frequency)
-    assert probe.elements * probe.pitch == pytest.approx(length, rel=2e-3)
+    probe = Probe(preset=preset)
+    assert (probe.elements, probe.frequency_MHz) == (elements, frequency)
+    assert probe.elements * probe.pitch_um == pytest.approx(length, rel=2e-3)
 
 
 def test_lines_of_the_linear_array_are_parallel_unless_they_are_told_otherwise():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from echotruth.imaging.beamforming import scanner
+from echotruth.units import MHz, um
 
 SPEED = 1540.0
 
@@ -15,16 +16,16 @@ class ExactRecord:
     """
 
     def __init__(self, probe, depth, latest, elevation=True):
-        p = probe.si()
-        self.samples, self.sampling = 2160, p.sampling
-        self.centres = (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
-        self.centre_frequency = p.frequency
-        half_band = 1.289 * p.bandwidth * p.frequency
-        bins = np.arange(self.samples // 2) / self.samples * p.sampling
-        bins = np.flatnonzero(np.abs(bins - p.frequency) < half_band)
-        self.first_bin, self.frequency = int(bins[0]), bins / self.samples * p.sampling
-        width = p.bandwidth * p.frequency / np.sqrt(8 * np.log(2))
-        self.pulse = np.exp(-((self.frequency - p.frequency) ** 2) / (2 * width**2))
+        sampling, centre, bandwidth = probe.sampling_MHz * MHz, probe.frequency_MHz * MHz, probe.bandwidth
+        self.samples, self.sampling = 2160, sampling
+        self.centres = (np.arange(probe.elements) - (probe.elements - 1) / 2) * (probe.pitch_um * um)
+        self.centre_frequency = centre
+        half_band = 1.289 * bandwidth * centre
+        bins = np.arange(self.samples // 2) / self.samples * sampling
+        bins = np.flatnonzero(np.abs(bins - centre) < half_band)
+        self.first_bin, self.frequency = int(bins[0]), bins / self.samples * sampling
+        width = bandwidth * centre / np.sqrt(8 * np.log(2))
+        self.pulse = np.exp(-((self.frequency - centre) ** 2) / (2 * width**2))
 
     def __call__(self, position, amplitude, exponent=0.0):
         distance = np.hypot(position[:, 0] - self.centres[:, None], position[:, 1])

@@ -11,6 +11,7 @@ from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.rf import ring_down
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
+from echotruth.units import mm
 
 SMALL = {"probe": {"elements": 16, "pitch_um": 90.0}, "rf": {"lines": 16}, "phantom": {"density_per_mm3": 300.0}}
 ALL = {
@@ -26,7 +27,7 @@ ALL = {
 @pytest.fixture(scope="module")
 def scanner():
     config = Config.model_validate(SMALL)
-    return Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
+    return Scanner(config.probe, config.rf, config.bmode.field_of_view_mm * mm)
 
 
 @pytest.fixture(scope="module")

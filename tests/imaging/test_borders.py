@@ -10,6 +10,7 @@ from echotruth.config import Config
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.medium.borders import Endocardium, Epicardium, border_amplitude
 from echotruth.imaging.medium.mitral_valve import Leaflets, Part
+from echotruth.units import MHz, mm
 
 CONFIG = Config.model_validate(
     {
@@ -31,8 +32,8 @@ def heart(half_sphere, hemispherical_heart):
 def test_scatterers_are_spread_evenly_over_the_surface(heart):
     border = Epicardium.seed(scene(CONFIG, heart))
     position = border.scene.plane.to_heart(border.positions(0))
-    probe = CONFIG.probe.si()
-    expected = np.pi * (3e-3 * probe.frequency / probe.sound_speed) ** 2  # half a sphere
+    wavelength = CONFIG.probe.sound_speed_m_per_s / (CONFIG.probe.frequency_MHz * MHz)
+    expected = np.pi * (3e-3 / wavelength) ** 2  # half a sphere
     assert abs(len(position) - expected) < 5 * np.sqrt(expected) + 0.01 * expected
     np.testing.assert_allclose(np.linalg.norm(position, axis=1), 3e-3, rtol=2e-3)
     # The height of points that are even on a sphere is even.
@@ -49,8 +50,8 @@ def test_amplitude_grows_with_the_area(heart):
 @pytest.fixture(scope="module")
 def level():
     """Function of positions (n, 3), m, about the focus and amplitudes (n,): greatest power over that of muscle, dB."""
-    scanner = Scanner(CONFIG.probe, CONFIG.rf, CONFIG.bmode.si().field_of_view)
-    focus, random = CONFIG.rf.si().focus, np.random.default_rng(4)
+    scanner = Scanner(CONFIG.probe, CONFIG.rf, CONFIG.bmode.field_of_view_mm * mm)
+    focus, random = CONFIG.rf.focus_mm * mm, np.random.default_rng(4)
     middle, near = np.argsort(np.abs(scanner.scan.angle))[:6], np.abs(scanner.range - focus) < 0.4e-3
 
     def power(position, amplitude):
@@ -69,8 +70,8 @@ def tilted(sheet, degrees):
 
 
 def test_flat_border_across_the_beam_has_its_level_and_a_tilted_one_has_not(level):
-    probe, random = CONFIG.probe.si(), np.random.default_rng(5)
-    count = random.poisson((probe.frequency / probe.sound_speed) ** 2 / 2 * 4 * HALF[0] * HALF[2])
+    probe, random = CONFIG.probe, np.random.default_rng(5)
+    count = random.poisson((probe.frequency_MHz * MHz / probe.sound_speed_m_per_s) ** 2 / 2 * 4 * HALF[0] * HALF[2])
     sheet, amplitude = random.uniform(-1, 1, (count, 2)) * HALF[[0, 2]], np.full(count, border_amplitude(CONFIG, 10.0))
     across, oblique = (level(tilted(sheet, tilt), amplitude) for tilt in (0.0, 25.0))
     assert across == pytest.approx(10, abs=3)

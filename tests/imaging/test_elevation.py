@@ -90,7 +90,7 @@ def test_either_side_of_the_plane_is_alike(lens):
 
 
 def test_it_is_looked_up_between_the_least_and_the_greatest_curvature(lens):
-    half, lateral = 31.5 * Probe().si().pitch, np.array([0.0, 1e-3, -3e-3])
+    half, lateral = 31.5e-6 * Probe().pitch_um, np.array([0.0, 1e-3, -3e-3])
     _, terms = lens.lens_terms(np.stack([lateral, np.full(3, 5e-3), np.zeros(3)], axis=1), 1540.0)
     elements = np.linspace(-half, half, 20001)
     curvature = 1 / np.hypot(lateral[:, None] - elements, 5e-3)

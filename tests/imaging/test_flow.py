@@ -19,6 +19,7 @@ from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
 from echotruth.repository import schema
 from echotruth.repository.rounding import length_quantum, rounded
+from echotruth.units import MHz, mm
 
 CONFIG = Config()
 AXIS = (np.arange(96) + 0.5) / 96 * 12e-3
@@ -220,8 +221,8 @@ def test_slice_is_as_thick_as_a_squared_sinc_in_the_focus():
     """|E|^2 is sinc^2(H y / (lambda F)), which is half its maximum at 0.443."""
     for name in ("mouse_25MHz", "mouse_40MHz", "rat_15MHz", "human_2_7MHz"):
         p = Probe(preset=name)
-        focus, wavelength = p.si().elevation_focus, p.si().sound_speed / p.si().frequency
-        expected = 0.8859 * wavelength * focus / p.si().height
+        focus, wavelength = p.elevation_focus_mm * mm, p.sound_speed_m_per_s / (p.frequency_MHz * MHz)
+        expected = 0.8859 * wavelength * focus / (p.height_mm * mm)
         assert beam_thickness(p, np.array([focus]))[0] == pytest.approx(expected, rel=1e-3)
 
 

@@ -15,6 +15,7 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.filling import aortic_opening, emptied, opening, volumes
 from echotruth.imaging.medium.medium import bodies
 from echotruth.imaging.medium.surroundings import Surroundings, tissues
+from echotruth.units import per_mm3
 
 LEVELS = {
     "chambers_dB": 0.0,
@@ -49,7 +50,7 @@ def power_dB(around, box, volume):
     lateral, axial, elevation = around.positions(0).T
     inside = box(lateral, axial) & (np.abs(elevation) < 0.15e-3)
     power = around.amplitude[inside] ** 2
-    relative = power.sum() / volume / CONFIG.phantom.si().density
+    relative = power.sum() / volume / (CONFIG.phantom.density_per_mm3 * per_mm3)
     return 10 * np.log10(relative), 10 / np.log(10) * np.sqrt((power**2).sum()) / power.sum()
 
 

@@ -8,6 +8,7 @@ from echotruth.config import Config, Probe
 from echotruth.config.loading import ConfigError, validate
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
+from echotruth.units import mm
 
 DEPTH = 11e-3
 PROBE = Probe()
@@ -90,7 +91,7 @@ def test_a_power_of_zero_leaves_every_byte_as_it_is(plane):
 
 def test_lines_are_those_of_the_same_power_and_bad_powers_are_refused():
     config = Config.model_validate({"probe": {"elements": 16}, "rf": {"lines": 16, "elevation_beam": False}})
-    scanner = Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
+    scanner = Scanner(config.probe, config.rf, config.bmode.field_of_view_mm * mm)
     position, amplitude = sector(50)
     lines = scanner.lines(position, amplitude, 2.0)
     assert np.array_equal(lines, scanner.beamform(scanner.matrix(position, amplitude, np.full(50, 2.0))))

@@ -6,6 +6,7 @@ from scenes import scene
 
 from echotruth.config import Config
 from echotruth.imaging.medium.surroundings import Surroundings, SurroundingsMotion, epicardial_nodes, outside_heart
+from echotruth.units import per_mm3
 
 CONFIG = Config.model_validate(
     {"realism": {"surroundings": {"level_dB": -12.0, "density": 0.02, "motion_decay_mm": 0.5}}}
@@ -103,4 +104,4 @@ def test_their_power_in_a_volume_is_that_of_muscle_times_the_level(seeded, mid):
     box = (np.abs(lateral) < 2e-3) & (np.abs(axial - 7e-3) < 3e-3) & (np.abs(elevation) < 0.15e-3)
     power = (amplitude[box] ** 2).sum() / (4e-3 * 6e-3 * 0.3e-3)
     error = 10 / np.log(10) * np.sqrt(2 / box.sum())
-    assert 10 * np.log10(power / CONFIG.phantom.si().density) == pytest.approx(-12, abs=4 * error)
+    assert 10 * np.log10(power / (CONFIG.phantom.density_per_mm3 * per_mm3)) == pytest.approx(-12, abs=4 * error)

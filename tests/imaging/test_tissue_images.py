@@ -15,6 +15,7 @@ from echotruth.imaging.medium.surroundings import Surroundings
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.truth import pixel_truth
 from echotruth.imaging.view import imaging_plane
+from echotruth.units import mm
 
 CONFIG = Config.model_validate(
     {
@@ -130,7 +131,7 @@ def test_cavity_and_right_ventricle_narrow_as_the_heart_does_and_the_docs_say(he
     level, length = at.origin[2], heart.endo_at_ed[:, 2].min()
     before, now = (1 - (height / length) ** 2 for height in (level, level + 0.5e-3))
     assert areas[1] / areas[0] == pytest.approx((0.8**2 + 0.05**2) * now / before, rel=0.02)
-    middle = np.abs(AXIAL - CONFIG.rf.si().focus).argmin()
+    middle = np.abs(AXIAL - CONFIG.rf.focus_mm * mm).argmin()
     row = np.s_[middle - 3 : middle + 4]
     # Of the right ventricle at end-diastole, the pixels inside the septum are those of the wall.
     septum = [pixel_truth(heart, at, AXIAL, LATERAL, images)["tissue"][frame][row] for frame in (0, ES)]

@@ -20,6 +20,7 @@ from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.medium.tricuspid_valve import TricuspidValve
 from echotruth.imaging.view import imaging_plane
+from echotruth.units import per_mm3
 
 CONFIG = Config.model_validate(
     {"phantom": {"density_per_mm3": 3000.0}, "realism": {"preset": "mouse"}, "views": {"preset": "echo"}}
@@ -161,7 +162,7 @@ def test_papillary_muscles_are_as_dense_as_muscle_in_the_cavity_and_attached_to_
     for number, azimuth in enumerate(AZIMUTHS):
         one = muscles.position[muscles.muscle == number]
         box = (np.abs(one - one.mean(axis=0)) < 0.1e-3).all(axis=1).sum()
-        expected = CONFIG.phantom.si().density * 0.2e-3**3
+        expected = CONFIG.phantom.density_per_mm3 * per_mm3 * 0.2e-3**3
         assert abs(box - expected) < 4 * np.sqrt(expected)
         # From its root outwards is muscle; beside its tip is blood.
         radial = np.array([np.cos(azimuth), np.sin(azimuth), 0])

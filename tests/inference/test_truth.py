@@ -5,7 +5,7 @@ import pytest
 
 import echotruth as et
 from echotruth.inference.truth import truth
-from echotruth.section import UNITS
+from echotruth.units import mmHg
 
 
 def test_true_contractility_of_an_infarct_is_none_there_and_one_in_the_mean_of_the_wall():
@@ -17,7 +17,7 @@ def test_true_contractility_of_an_infarct_is_none_there_and_one_in_the_mean_of_t
     # A segment that is a fresh scar of twice the stiffness while the heart fills, over another that is healthy.
     assert true["stiffness.7"] / true["stiffness.11"] == pytest.approx(2, rel=1e-6)
     pressure = heart.arrays["mechanics"]["pressure"]
-    assert true["loop.esp_mmHg"] == pytest.approx(pressure[heart.es] / UNITS["mmHg"])
+    assert true["loop.esp_mmHg"] == pytest.approx(pressure[heart.es] / mmHg)
 
 
 def test_true_values_of_a_healthy_heart_are_its_configuration():

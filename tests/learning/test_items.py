@@ -16,6 +16,7 @@ from echotruth.config import Config
 from echotruth.imaging.beamforming.scan import scan_width
 from echotruth.imaging.flow import slice_thickness
 from echotruth.mechanics.prescribed import motion_amplitude
+from echotruth.units import mm
 
 FRAMES, SIZE = 3, 64
 KINDS = {
@@ -54,7 +55,7 @@ def coordinate(items, name):
 def centres(items):
     """Pixel centres about the fixed point of the motion, which is at the transmit focus, (axial, lateral, 3), m."""
     index = (np.arange(items.size) - (items.size - 1) / 2) * items.spacing
-    axial = coordinate(items, "axial") - items.repository.config.rf.si().focus
+    axial = coordinate(items, "axial") - items.repository.config.rf.focus_mm * mm
     return np.stack(np.broadcast_arrays(index, axial[:, None], 0.0), axis=-1)
 
 
@@ -123,7 +124,7 @@ def assert_leaves_and_enters(pairs, half):
 @pytest.mark.parametrize("start", [0, 1])
 def test_points_move_with_the_tissue_and_are_seen_within_the_slice(repository, start):
     tracks = learning.PointTracks(repository, views=["mid"], points=50, start=start)
-    item, focus = tracks[0], tracks.repository.config.rf.si().focus
+    item, focus = tracks[0], tracks.repository.config.rf.focus_mm * mm
     about = item["position_m"] - np.array([0, focus, 0], np.float32)
     expected = np.stack([moved(about[start].astype(float), start, frame) for frame in range(FRAMES)])
     np.testing.assert_allclose(about, expected, atol=1e-8)

@@ -22,6 +22,7 @@ from echotruth.mechanics.fibres import CENTROID
 from echotruth.mechanics.geometry import left_ventricle
 from echotruth.mechanics.physiology import measures
 from echotruth.mechanics.prescribed import MotionError, displacement_at, motion_amplitude, prescribed_motion
+from echotruth.units import mm
 
 INNER, OUTER, LENGTH = 1.45e-3, 2.45e-3, 6.8e-3
 """Of the default tube, m."""
@@ -201,7 +202,7 @@ def test_the_image_moves_as_asked():
     setting = Config(**{**setting.model_dump(include={"geometry", "loop", "motion"}), **imaging})
     moving = heart(setting)
     scatterers = Wall.seed(scene(setting, moving))
-    scanner = Scanner(setting.probe, setting.rf, setting.bmode.si().field_of_view)
+    scanner = Scanner(setting.probe, setting.rf, setting.bmode.field_of_view_mm * mm)
     lines = np.stack([scanner.lines(scatterers.positions(frame), scatterers.amplitude) for frame in (0, 1)])
     gain = time_gain_compensation(setting.probe, setting.bmode, scanner.range)
     before, after = bmode_clip(lines, scanner.scan, scanner.range, setting.bmode, gain)[512].astype(float)

@@ -9,6 +9,7 @@ from finished_repository import begin, blank, do
 from echotruth.config import Bmode, Config, Geometry, Loop, PhaseCorrelation, Probe, Rf, Tracking, View
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.recorder import RfRecorder, sixteen_bit
+from echotruth.units import mm
 from echotruth.workflow.job import Job
 
 FRAMES = 2
@@ -31,7 +32,7 @@ def configured(keep, **rf):
 def scanner(**rf):
     """One for all that is to be kept: making it takes longer than a frame."""
     config = configured([], **rf)
-    return Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
+    return Scanner(config.probe, config.rf, config.bmode.field_of_view_mm * mm)
 
 
 def scatterers(seed):

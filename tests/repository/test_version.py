@@ -94,7 +94,7 @@ def changed(monkeypatch, change, **settings):
         ("mechanics/geometry/remeshing.py", set()),
         ("repository/group.py", set()),
         ("repository/rounding.py", set(OF_VIEW)),
-        ("echotruth/section.py", set(OF_VIEW)),
+        ("echotruth/units.py", set(OF_VIEW)),
         ("report/style.py", set()),
         ("scripts/bmode.py", {"bmode", "tracking"}),
         ("scripts/points.py", {"points", "tracking"}),
@@ -109,7 +109,7 @@ def test_reader_of_a_motion_counts_where_a_motion_is_read(monkeypatch):
 
 
 def test_unit_that_is_another_number_changes_every_version():
-    assert PACKAGE / "section.py" in files_of("bmode") and "UNITS" in (PACKAGE / "section.py").read_text()
+    assert PACKAGE / "units.py" in files_of("bmode") and "UNITS" in (PACKAGE / "units.py").read_text()
 
 
 def test_data_of_a_module_count_as_it_does():

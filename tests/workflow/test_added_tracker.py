@@ -19,6 +19,7 @@ from echotruth.config.tracking import Dis, External
 from echotruth.evaluation.tracker_options import parse_tracker
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.repository.check import check
+from echotruth.units import mm
 from echotruth.workflow.added_tracker import prepare
 from echotruth.workflow.job import Job
 
@@ -134,7 +135,7 @@ def in_image(folder, affine, view):
     matrix, shift = affine[0] - np.eye(3), affine[1]
     where = et.Repository(folder).plane(FIRST, view)
     axial, lateral = pixel_centres(CONFIG.bmode, 128)
-    corner = np.array([lateral[0], axial[0]]) - CONFIG.bmode.si().field_of_view / 128 / 2
+    corner = np.array([lateral[0], axial[0]]) - CONFIG.bmode.field_of_view_mm * mm / 128 / 2
     axes = where.axes[:2]
     return axes @ matrix @ axes.T, axes @ (matrix @ (where.origin + corner @ axes) + shift)
 

@@ -5,7 +5,7 @@ from functools import cache
 from hashlib import sha256
 from typing import Any
 
-from echotruth.section import unit_of
+from echotruth.units import unit_of
 
 READABLE_LENGTH = 40
 """Longest readable part of an id, letters."""

@@ -9,6 +9,7 @@ from echotruth.cases import labels
 from echotruth.cases.case import Case
 from echotruth.cases.checks import can_be_swept
 from echotruth.config import Config, Section
+from echotruth.section import dotted_values
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,15 +43,11 @@ def _columns(name: str, sections: list[Section]) -> dict[str, list[Any]]:
     return {key: [values[section].get(key, nan) for section in order] for key in keys}
 
 
-def _sweepable(section: Section, prefix: str = "") -> dict[str, Any]:
-    """Dotted key -> value of all keys that can be swept."""
-    values: dict[str, Any] = {}
-    section = section.resolved()
-    for key in type(section).model_fields:
-        dotted, value = f"{prefix}{key}", getattr(section, key)
-        if isinstance(value, Section):
-            values |= _sweepable(value, f"{dotted}.")
-        elif can_be_swept(dotted) and not isinstance(value, dict) and dotted != "seed":
-            # A list is one entry of the table.
-            values[dotted] = " ".join(map(str, value)) if isinstance(value, list) else value
-    return values
+def _sweepable(section: Section, prefix: str) -> dict[str, Any]:
+    """Dotted key -> value of all keys that can be swept; a list is one entry of the table."""
+    values = {key: value for key, value in dotted_values(section.resolved(), prefix) if can_be_swept(key)}
+    return {
+        key: " ".join(map(str, value)) if isinstance(value, list) else value
+        for key, value in values.items()
+        if not isinstance(value, dict)
+    }

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, FiniteFloat, WithJsonSchema, model_serializer, model_validator
 
+from echotruth.config.presets import PRESETS
 from echotruth.config.reading import ConfigError, read_text
 from echotruth.config.table import MAX_BYTES, MAX_CASES, TableError, parse, swept
 from echotruth.section import Section, check, invalid
@@ -76,64 +77,13 @@ class Distribution(Section):
         self.require(0 < sum(self.weights) < 1e300, "weights", "must have a positive entry and a finite sum")
 
 
-ACOUSTICS: dict[str, dict[str, Any]] = {
-    "probe.attenuation_dB_per_cm_MHz": {"uniform": [0.4, 0.65]},
-    "bmode.tgc_dB_per_cm_MHz": {"uniform": [0.4, 0.65]},
-    "realism.backscatter.anisotropy_dB": {"uniform": [0, 14.5]},
-    "realism.backscatter.fibre_strain_dB": {"uniform": [0, 40]},
-    "realism.borders.endocardium_dB": {"uniform": [5, 18]},
-    "realism.borders.epicardium_dB": {"uniform": [8, 25]},
-    "realism.blood.level_dB": {"uniform": [-30, -14]},
-    "realism.surroundings.level_dB": {"uniform": [-20, -2]},
-    "realism.neighbours.posterior_dB": {"uniform": [-5, 8]},
-    "realism.noise.snr_dB": {"uniform": [45, 80]},
-    "realism.haze.level_dB": {"uniform": [-20, -4]},
-    "realism.shadow.side": {"choice": ["none", "left", "right"], "weights": [2, 1, 1]},
-    "realism.shadow.edge_deg": {"uniform": [5, 25]},
-    "bmode.dynamic_range_dB": {"uniform": [50, 70]},
-    "bmode.gain_dB": {"uniform": [-10, 2]},
-    "bmode.grey_map": {"choice": ["linear", "s_curve"]},
-    "bmode.grey_gamma": {"uniform": [0.7, 1.6]},
-    "bmode.smoothing": {"uniform": [0, 1]},
-    "bmode.edge_enhancement": {"uniform": [0, 1]},
-    "bmode.dropout.loss_dB": {"uniform": [0, 10]},
-    "bmode.dropout.edge_loss_dB": {"uniform": [0, 25]},
-}
-"""Distributions of `cases.draw.preset: acoustics`; docs/realism.md says where each range is from."""
-POSES: dict[str, list[float]] = {
-    "angle_deg": [-10, 10],
-    "offset.lateral_mm": [-0.08, 0.08],
-    "offset.axial_mm": [-0.05, 0.05],
-    "motion.drift.lateral_mm": [-0.015, 0.015],
-    "motion.drift.elevation_mm": [-0.015, 0.015],
-    "motion.breathing.axial_mm": [0, 0.03],
-    "motion.breathing.phase_deg": [0, 360],
-    "motion.rocking_deg": [-1.5, 1.5],
-}
+POSES: dict[str, list[float]] = PRESETS["poses"]
 """Bounds of keys of every view that `cases.draw.preset: acoustics` draws uniformly, beside their value in the
-configuration; lengths over `rf.focus_mm`. docs/realism.md says where each range is from."""
-HEARTS: dict[str, dict[str, Any]] = {
-    "geometry.scale": {"uniform": [0.88, 1.12]},
-    "geometry.elongation": {"uniform": [0.88, 1.12]},
-    "geometry.hypertrophy": {"choice": [1.0, 1.1, 1.2, 1.3], "weights": [3, 1, 1, 1]},
-    "geometry.dilation": {"choice": [1.0, 1.05, 1.1], "weights": [2, 1, 1]},
-    "fibres.endo_deg": {"uniform": [60, 85]},
-    "fibres.epi_deg": {"uniform": [-60, -35]},
-    "mechanics.active.sheet_share": {"uniform": [0.3, 0.48]},
-    "mechanics.active.normal_share": {"uniform": [0.1, 0.22]},
-    "loop.circulation.contractility": {"uniform": [0.6, 1.4]},
-    "loop.circulation.resistance": {"uniform": [0.7, 1.4]},
-    "loop.circulation.retained_volume_stroke_volumes": {"uniform": [-1, 4]},
-    "pathology.infarct.segments": {
-        "choice": [None, [7, 8], [9, 10], [11, 12], [1, 7, 8, 13, 14], [13, 14, 15, 16, 17]],
-        "weights": [5, 1, 1, 1, 1, 1],
-    },
-    "pathology.infarct.age": {"choice": ["fresh", "old"]},
-    "pathology.activation.preset": {"choice": [None, "lbbb"], "weights": [3, 1]},
-}
-"""Distributions of `cases.draw.preset: hearts`, of any species; docs/cases.md says where each range is from, and how
-many of the hearts are usable."""
-DRAW_PRESETS = {"acoustics": ACOUSTICS, "hearts": HEARTS}
+configuration; lengths over `rf.focus_mm`."""
+DRAW_PRESETS: dict[str, dict[str, dict[str, Any]]] = PRESETS["draws"]
+"""`cases.draw.preset` -> distributions of dotted keys."""
+HEARTS = DRAW_PRESETS["hearts"]
+"""Distributions of `cases.draw.preset: hearts`."""
 
 
 def _as_list(value: Any) -> Any:
@@ -175,17 +125,6 @@ class Draw(Section):
             return values
         presets = {key: drawn for name in presets_of(values) for key, drawn in DRAW_PRESETS[name].items()}
         return values | {"keys": presets | keys} if presets else values
-
-
-def poses(views: dict[str, Any], focus_mm: float) -> dict[str, dict[str, Any]]:
-    """Distributions of the poses of views: name -> dotted key of a view -> its value where it is not drawn."""
-    found: dict[str, dict[str, Any]] = {}
-    for name, view in views.items():
-        for key, about in POSES.items():
-            scale = focus_mm if key.endswith("_mm") else 1.0
-            bounds = [round(view.get(key, 0) + scale * bound, 6) for bound in about]
-            found[f"views.{name}.{key}"] = {"uniform": bounds}
-    return found
 
 
 class Cases(Section):

@@ -5,93 +5,22 @@ scan from the array, lengths of trackers from the field of view.
 from math import isfinite
 from typing import Any, NamedTuple
 
-from echotruth.config.cases import POSES, poses, presets_of
+from echotruth.config.cases import POSES, presets_of
 from echotruth.config.imaging import VIEWS
 from echotruth.config.merging import merged, nested
+from echotruth.config.presets import PRESETS
 from echotruth.config.tracking import METHODS, PhaseCorrelation, default_trackers, name_of
 from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
 
-HEART_DEFAULTS: dict[str, dict[str, Any]] = {
-    "mouse": {"loop.file": "mouse", "probe.preset": "mouse_25MHz"},
-    "rat": {
-        "loop.file": "rat",
-        "probe.preset": "rat_15MHz",
-        "fibres.epi_deg": -41.0,
-        "mechanics.active.shortening_velocity_max_per_s": 12.0,
-        "mechanics.active.sheet_share": 0.38,
-        "pathology.activation.fibre_speed_m_per_s": 0.65,
-        "pathology.activation.cross_fibre_speed_m_per_s": 0.45,
-        "pathology.activation.purkinje_speed_m_per_s": 1.2,
-        "mechanics.pericardium.spring_kPa_per_mm": 0.5,
-        "physiology.fibre_shortening_rate_max_per_s": 7.0,
-        "physiology.wall_mass_min_g": 0.2,
-        "physiology.wall_mass_max_g": 2.0,
-    },
-    "human": {
-        "loop.file": "human",
-        "probe.preset": "human_2_7MHz",
-        "fibres.endo_deg": 72.0,
-        "fibres.epi_deg": -52.0,
-        "pathology.activation.fibre_speed_m_per_s": 0.65,
-        "pathology.activation.cross_fibre_speed_m_per_s": 0.45,
-        "pathology.activation.purkinje_speed_m_per_s": 2.0,
-        "mechanics.active.shortening_velocity_max_per_s": 8.0,
-        "mechanics.active.sheet_share": 0.3,
-        "mechanics.active.length_sensitivity": 10.0,
-        "mechanics.active.normal_share": 0.18,
-        "mechanics.pericardium.spring_kPa_per_mm": 0.1,
-        "physiology.fibre_shortening_rate_max_per_s": 3.0,
-        "physiology.twist_es_max_deg": 25.0,
-        "physiology.circumferential_strain_min": -0.26,
-        "physiology.circumferential_strain_max": -0.1,
-        "physiology.gls_max": -0.13,
-        "physiology.ejection_fraction_min": 0.45,
-        "physiology.ejection_fraction_max": 0.8,
-        "physiology.edp_min_mmHg": 3.0,
-        "physiology.edp_max_mmHg": 14.0,
-        "physiology.edv_per_mass_min_mL_per_g": 0.9,
-        "physiology.edv_per_mass_max_mL_per_g": 2.8,
-        "physiology.output_per_mass_min_mL_per_min_per_g": 25.0,
-        "physiology.output_per_mass_max_mL_per_min_per_g": 120.0,
-        "physiology.wall_mass_min_g": 40.0,
-        "physiology.wall_mass_max_g": 350.0,
-        "physiology.radial_strain_min": 0.2,
-        "physiology.radial_strain_max": 0.95,
-        "physiology.segment_circumferential_strain_min": -0.32,
-    },
-}
+HEART_DEFAULTS: dict[str, dict[str, Any]] = PRESETS["heart"]
 """`geometry.preset` -> default of dotted keys."""
-
-DISEASE_DEFAULTS: dict[str, dict[str, Any]] = {
-    "hypertension": {
-        "geometry.hypertrophy": 1.2,
-        "loop.kind": "circulation",
-        "loop.circulation.resistance": 1.25,
-        "loop.circulation.compliance": 0.67,
-        "loop.circulation.retained_volume_stroke_volumes": 2.0,
-        "loop.circulation.baroreflex": False,
-    },
-    "dcm": {
-        "geometry.dilation": 1.1,
-        "loop.kind": "circulation",
-        "loop.circulation.contractility": 0.55,
-        "loop.circulation.retained_volume_stroke_volumes": 5.0,
-    },
-}
-"""`pathology.preset` -> default of dotted keys; docs/physiology.md says where each is from."""
-DISEASE_OF_HEART: dict[tuple[str, str], dict[str, Any]] = {
-    ("dcm", "rat"): {"loop.circulation.contractility": 0.68},
-    ("dcm", "human"): {"loop.circulation.contractility": 0.7},
-}
-"""`pathology.preset` and `geometry.preset` -> what differs from that."""
+DISEASE_DEFAULTS: dict[str, dict[str, Any]] = PRESETS["disease"]
+"""`pathology.preset` -> default of dotted keys."""
+DISEASE_OF_HEART: dict[str, dict[str, dict[str, Any]]] = PRESETS["disease_of_heart"]
+"""`pathology.preset` -> `geometry.preset` -> what differs from that."""
 REALISM_SMOOTHING = 1 / 260
 """Default of `bmode.smoothing_width_px` over the side of the image, with any `realism.preset`."""
-REALISM_IMAGE: dict[str, Any] = {
-    "probe.attenuation_dB_per_cm_MHz": 0.5,
-    "bmode.dynamic_range_dB": 60.0,
-    "bmode.grey_gamma": 1.6,
-    "bmode.smoothing": 1.0,
-}
+REALISM_IMAGE: dict[str, Any] = PRESETS["realistic_image"]
 """Defaults of dotted keys with any `realism.preset`."""
 REALISM_EDGE_LOSS_DB, REALISM_EDGE_DEG = 22.0, 85.0
 """Default of `bmode.dropout.edge_loss_dB` of a sector, with any `realism.preset`, and the opening angle of that sector;
@@ -99,42 +28,17 @@ of others it is that of lines at the same angle."""
 
 
 class Look(NamedTuple):
-    """Defaults of realistic images of a species that differ from those of another.
-
-    Attributes
-    ----------
-    bandwidth : float
-        Bandwidth, and density of scatterers, of which a longer pulse needs fewer, over those of the array.
-    gain_dB : float
-        `bmode.gain_dB`.
-    time_gain_dB : dict
-        `bmode.time_gain` by the range over the field of view of the array: with it, an even medium is as bright at any
-        range of the default array.
-    harmonic : float or None
-        Frequency at which harmonics are received, over that of the array, whose band must hold it and its half; none
-        without harmonic imaging.
-    scan : dict
-        Dotted keys whose defaults are so many times those of the array, so that the roof of the atria is seen.
-    """
+    """Defaults of realistic images of a species that differ from those of another, as presets.yaml explains them."""
 
     bandwidth: float
     gain_dB: float
     time_gain_dB: dict[float, float]
     harmonic: float | None
-    scan: dict[str, float]
+    scan: dict[str, tuple[float, float]]
 
 
-REALISM_LOOKS = {
-    "mouse": Look(0.6, -5.0, {0.1: 7, 0.17: 4, 0.23: 2, 0.3: 0, 0.5: 1.5, 0.75: 4, 1.0: 7, 1.25: 9}, None, {}),
-    "human": Look(
-        0.15,
-        -9.5,
-        {0.1: 20, 0.17: 14, 0.23: 5.5, 0.3: 0, 0.5: 0, 0.63: 3, 0.77: 7, 0.9: 10.5, 1.03: 12, 1.27: 14.5},
-        1.25,
-        {"rf.focus_mm": 76 / 70, "rf.sector_deg": 85 / 75, "bmode.field_of_view_mm": 1.2},
-    ),
-}
-"""By `realism.preset`; docs/realism.md says what they were fitted to."""
+REALISM_LOOKS = {name: Look(**look) for name, look in PRESETS["looks"].items()}
+"""By `realism.preset`."""
 
 ARRAY_SUFFIXES = (".npy", ".npz")
 """Files of positions without a mesh."""
@@ -162,7 +66,8 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     values = _filled(values, HEART_DEFAULTS.get(heart, HEART_DEFAULTS["mouse"]))
     disease = str(_value(values, "pathology.preset"))
     if _value(values, "loop.kind") in (None, "circulation"):
-        values = _filled(_filled(values, DISEASE_OF_HEART.get((disease, heart), {})), DISEASE_DEFAULTS.get(disease, {}))
+        values = _filled(values, DISEASE_OF_HEART.get(disease, {}).get(heart, {}))
+        values = _filled(values, DISEASE_DEFAULTS.get(disease, {}))
     array = str(_value(values, "probe.preset"))
     values = _filled(values, _scanner(values, array))
     values = _filled(values, ARRAY_DEFAULTS.get(array, {}))
@@ -214,7 +119,7 @@ def _scan(array: str, look: Look) -> dict[str, Any]:
     if array not in ARRAY_DEFAULTS:
         return {}
     default, gain = ARRAY_DEFAULTS[array], look.time_gain_dB
-    scan = {key: round(share * default[key], 3) for key, share in look.scan.items()}
+    scan = {key: round(value / usual * default[key], 3) for key, (value, usual) in look.scan.items()}
     if default.get("rf.scan") != "linear":
         sector = scan.get("rf.sector_deg", default["rf.sector_deg"])
         scan["bmode.dropout.edge_loss_dB"] = round(REALISM_EDGE_LOSS_DB * (sector / REALISM_EDGE_DEG) ** 2, 1)
@@ -260,10 +165,19 @@ def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
     valid = isinstance(draw, dict) and isinstance(draw.get("keys", {}), dict) and isinstance(views, dict)
     if not valid or "acoustics" not in presets_of(draw) or not _is_finite(focus):
         return values
-    known = {name: {key: _value({"view": view}, f"view.{key}") for key in POSES} for name, view in views.items()}
-    known = {name: {key: v for key, v in keys.items() if _is_finite(v)} for name, keys in known.items()}
-    keys = poses(known, focus) | draw.get("keys", {})
+    keys = _poses(views, focus) | draw.get("keys", {})
     return values | {"cases": values["cases"] | {"draw": draw | {"keys": keys}}}
+
+
+def _poses(views: dict[str, Any], focus_mm: float) -> dict[str, Any]:
+    """Distributions of the poses of views, about the pose that each has in the configuration."""
+    found: dict[str, Any] = {}
+    for name, view in views.items():
+        for key, bounds in POSES.items():
+            value, scale = _value(view, key), focus_mm if key.endswith("_mm") else 1.0
+            middle = value if _is_finite(value) else 0
+            found[f"views.{name}.{key}"] = {"uniform": [round(middle + scale * bound, 6) for bound in bounds]}
+    return found
 
 
 def _is_finite(value: Any) -> bool:

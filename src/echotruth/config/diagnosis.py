@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from echotruth.config.defaults import HEART_DEFAULTS
@@ -34,105 +36,24 @@ infarct of a day is twice as stiff (`pathology.infarct.age`).
 Limits = dict[str, float | None]
 
 
-def _limits(ranges: dict[str, tuple[float, float]], **single: float | None) -> Limits:
-    """Limits by their keys: of ranges, whose names stand for `min` and `max`, and single ones."""
-    return {name.format(side): r[i] for name, r in ranges.items() for i, side in enumerate(("min", "max"))} | single
+def _bounds() -> dict[str, Limits]:
+    """Table of bounds: a row for each key, a column for the findings that its name lists."""
+    with Path(__file__).with_name("bounds.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    return {
+        name: {row["key"]: None if row[column] == "null" else float(row[column]) for row in rows if row[column]}
+        for column in list(rows[0])[1:]
+        for name in column.split()
+    }
 
 
-_LIVING = _limits(
-    {
-        "ejection_fraction_{}": (0.1, 0.9),
-        "edp_{}_mmHg": (0.0, 40.0),
-        "edv_per_mass_{}_mL_per_g": (0.1, 5.0),
-        "output_per_mass_{}_mL_per_min_per_g": (15.0, 600.0),
-        "twist_ivc_{}_deg": (-15.0, 15.0),
-        "twist_es_{}_deg": (-10.0, 30.0),
-        "circumferential_strain_{}": (-0.35, -0.01),
-        "radial_strain_{}": (0.02, 1.2),
-        "segment_circumferential_strain_{}": (-0.4, 0.2),
-        "segment_longitudinal_strain_{}": (-0.4, 0.2),
-        "gls_{}": (-0.35, -0.02),
-        "torsional_shear_{}": (-0.06, 0.2),
-        "tei_index_{}": (0.1, 2.0),
-        "filling_ratio_{}": (0.2, 6.0),
-    },
-    edv_of_healthy_min=0.5,
-    radial_strain_ivc_max=0.2,
-    transmural_shear_ivc_max=0.2,
-    level_circumferential_strain_ivc_max=0.15,
-    segment_circumferential_strain_ivc_max=0.2,
-    level_radial_strain_ivc_max=0.25,
-    level_fibre_strain_ivc_max=0.15,
-    fibre_shortening_rate_max_per_s=15.0,
-    fibre_strain_spread_max=None,
-)
-"""What any living heart obeys, of whatever species and disease."""
-_EVEN = _LIVING | {
-    "level_circumferential_strain_ivc_max": 0.06,
-    "level_fibre_strain_ivc_max": 0.07,
-    "segment_circumferential_strain_ivc_max": 0.08,
-}
-"""Muscle that is activated at once waits for ejection at every level, however weak or loaded it is."""
-_SHORTENS = {"segment_circumferential_strain_max": 0.0, "segment_longitudinal_strain_max": 0.0}
-"""Every segment shortens."""
-_INFARCT = _LIVING | {
-    "ejection_fraction_max": 0.75,
-    "edv_of_healthy_min": 0.9,
-    "twist_es_min_deg": -5.0,
-    "level_circumferential_strain_ivc_max": 0.08,
-    "segment_circumferential_strain_ivc_max": 0.1,
-    "segment_circumferential_strain_max": 0.1,
-    "segment_longitudinal_strain_max": 0.1,
-}
-_SCAR = _INFARCT | {
-    "edv_of_healthy_min": 0.95,
-    "level_circumferential_strain_ivc_max": 0.06,
-    "segment_circumferential_strain_ivc_max": 0.06,
-    "segment_circumferential_strain_max": 0.06,
-    "segment_longitudinal_strain_max": 0.06,
-}
-_PRESSED: Limits = {
-    "edp_max_mmHg": 25.0,
-    "edv_of_healthy_min": 0.8,
-    "edv_per_mass_min_mL_per_g": 0.2,
-    "output_per_mass_min_mL_per_min_per_g": 25.0,
-    "tei_index_max": 1.0,
-    "filling_ratio_min": 0.4,
-}
-BOUNDS_OF: dict[str, Limits] = {
-    "infarct": _INFARCT,
-    "fresh_infarct": _SCAR,
-    "old_infarct": _SCAR,
-    "late_activation": _LIVING
-    | {
-        "ejection_fraction_max": 0.65,
-        "edv_of_healthy_min": 0.9,
-        "twist_es_min_deg": -5.0,
-        "segment_circumferential_strain_max": 0.1,
-    },
-    "dcm": _EVEN
-    | _SHORTENS
-    | {
-        "ejection_fraction_max": 0.45,
-        "edp_min_mmHg": 8.0,
-        "edv_of_healthy_min": 1.2,
-        "circumferential_strain_min": -0.16,
-        "gls_min": -0.18,
-    },
-    "hypertension": _PRESSED,
-    "weak": _EVEN | _SHORTENS | {"ejection_fraction_max": 0.7, "edv_of_healthy_min": 0.98, "twist_es_min_deg": 0.0},
-    "hyperdynamic": _EVEN,
-    "abnormal_load": _EVEN,
-    "hypertrophy": _PRESSED,
-    "dilation": _EVEN,
-    "remodelling": _LIVING,
-    "disarray": _LIVING,
-    "hypokinesia": _LIVING,
-    "fibrosis": _LIVING,
-    "unknown": _LIVING,
-}
-"""Finding -> limits that differ from those of the healthy heart. An `infarct` is of no stated age, and may be minutes
-old; `late_activation` is a left bundle branch block or a pacemaker."""
+BOUNDS_OF = _bounds()
+"""Finding -> limits that differ from those of the healthy heart.
+
+`unknown` has what any living heart obeys, of whatever species and disease. An `infarct` is of no stated age, and may be
+minutes old; `late_activation` is a left bundle branch block or a pacemaker. In all others the muscle is activated at
+once and waits for ejection at every level, however weak or loaded it is; every segment of a `weak` heart shortens.
+"""
 PARTS = {"dcm": ("weak", "abnormal_load", "dilation"), "hypertension": ("abnormal_load", "hypertrophy")}
 """`pathology.preset` -> findings that it includes."""
 

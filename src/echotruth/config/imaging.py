@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, FiniteFloat
 
+from echotruth.config.presets import PRESETS
 from echotruth.section import Fraction, Name, Positive, Section, check, invalid
 
 Distance = Annotated[FiniteFloat, Field(ge=-1000, le=1000)]
@@ -296,26 +297,8 @@ class Bmode(Section):
         self.require(abs(self.gain_dB) < self.dynamic_range_dB, "gain_dB", remedy)
 
 
-VIEWS: dict[str, dict[str, View]] = {
-    "paper": {
-        "base": View(position=0.2),
-        "mid": View(position=0.5),
-        "apex": View(position=0.8),
-        "long_axis": View(plane="long_axis"),
-    },
-    "echo": {
-        "basal": View(position=0.25),
-        "mid": View(position=0.5),
-        "apical": View(position=0.8),
-        "four_chamber": View(plane="long_axis", rotation_deg=-30, angle_deg=10),
-        "two_chamber": View(plane="long_axis", rotation_deg=-90, angle_deg=-8),
-        "three_chamber": View(plane="long_axis", rotation_deg=-150, angle_deg=10),
-    },
-}
-"""Views of each `views.preset`: the paper's, and those of an echo, whose long axes go through the middles of AHA
-segments in the usual display - the inferoseptal, the inferior and the inferolateral wall at the left - so that together
-they show all of a bullseye; turned a little, by eye, as the axis of a heart is seldom that of the beam. The basal
-plane is low enough for the base not to pass it as it descends."""
+VIEWS = {name: {view: View(**keys) for view, keys in views.items()} for name, views in PRESETS["views"].items()}
+"""Views of each `views.preset`."""
 
 
 def named_views(value: Any) -> Any:

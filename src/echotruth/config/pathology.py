@@ -6,18 +6,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
+from echotruth.config.presets import PRESETS
 from echotruth.config.regional import Segment
 from echotruth.section import Fraction, Positive, Section, check
 
 Azimuth = Annotated[FiniteFloat, Field(ge=-180, le=180)]
 Speed = Annotated[FiniteFloat, Field(ge=0.01, le=10)]
 
-
-SCARS: dict[str | None, dict[str, float]] = {
-    None: {"stiffness_scale": 20.0, "taut_stiffness_kPa": 0.0, "thickness_scale": 1.0},
-    "fresh": {"stiffness_scale": 2.0, "taut_stiffness_kPa": 400.0, "thickness_scale": 1.0},
-    "old": {"stiffness_scale": 5.0, "taut_stiffness_kPa": 1500.0, "thickness_scale": 0.6},
-}
+SCARS: dict[str | None, dict[str, float]] = PRESETS["scars"]
 """`age` of an infarct -> values of keys that are not given."""
 
 

@@ -7,6 +7,7 @@ from pydantic import Field, FiniteFloat, model_validator
 
 from echotruth.config.imaging import ScatteringExponent
 from echotruth.config.merging import difference, merged
+from echotruth.config.presets import PRESETS
 from echotruth.section import Positive, Section
 
 Level = Annotated[FiniteFloat, Field(ge=-80, le=20)]
@@ -164,55 +165,8 @@ class Borders(Section):
     """That of epicardium and pericardium."""
 
 
-def _preset(scale: float, times_ms: tuple[float, float], of_heart: dict[str, Any]) -> dict[str, Any]:
-    """Keys of a preset: lengths are those of a mouse times `scale`, times those of tissue and of blood.
-
-    Some are of the heart alone.
-    """
-    preset = {
-        "backscatter": {
-            "anisotropy_dB": 8.0,
-            "variation_dB": 4.5,
-            "variation_length_mm": 1.3 * scale,
-        },
-        "borders": {"endocardium_dB": 10.0, "epicardium_dB": 10.0},
-        "decorrelation": {"time_ms": times_ms[0]},
-        "blood": {"level_dB": -28.0, "density": 0.25, "decorrelation_time_ms": times_ms[1]},
-        "surroundings": {"level_dB": -5.5, "density": 0.25, "start_mm": scale, "motion_decay_mm": scale},
-        "neighbours": {
-            "chambers_dB": 0.0,
-            "lung_dB": -1.0,
-            "posterior_dB": 3.0,
-            "chest_wall_dB": -1.0,
-            "leaflets_dB": 15.0,
-            "papillary_muscles_dB": 0.0,
-        },
-        "haze": {"max_source_range_mm": 4 * scale, "mean_extra_range_mm": 1.6 * scale},
-        "ring_down": {"level_dB": 3.0},
-    }
-    return merged(preset, of_heart)
-
-
-REALISM_PRESETS: dict[str, dict[str, Any]] = {
-    "none": {},
-    "mouse": _preset(
-        1.0,
-        (500.0, 14.0),
-        {"backscatter": {"fibre_strain_dB": 30.0}, "noise": {"snr_dB": 60.0}, "haze": {"level_dB": -9.0}},
-    ),
-    "human": _preset(
-        12.5,
-        (350.0, 98.0),
-        {
-            "backscatter": {"fibre_strain_dB": 10.0},
-            "noise": {"snr_dB": 75.0},
-            "haze": {"level_dB": -4.0},
-            "aberration": {"delay_ns": 21.3, "correlation_length_mm": 2.5},
-            "shadow": {"side": "right", "depth_mm": 15.0, "edge_deg": 16.0, "edge_width_mm": 10.0, "level_dB": -6.0},
-        },
-    ),
-}
-"""Values of keys of each `realism.preset`; docs/realism.md says what they were fitted to."""
+REALISM_PRESETS: dict[str, dict[str, Any]] = PRESETS["realism"]
+"""Values of keys of each `realism.preset`."""
 
 
 class Realism(Section):

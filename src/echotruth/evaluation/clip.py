@@ -10,6 +10,7 @@ from echotruth.loop.cycle import frame_times
 from echotruth.repository.reader import Repository
 from echotruth.seeds import generator
 from echotruth.tracking.point_grid import grid_pixels, grid_points
+from echotruth.units import mm
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def make_clip(case: Case, view: str, frames: np.ndarray, labels: np.ndarray, ins
         mask=unpack(labels)["mask"],
         inside=inside,
         points=grid_points(config, size)[inside],
-        spacing=config.bmode.si().field_of_view / size,
+        spacing=config.bmode.field_of_view_mm * mm / size,
         frame_time=frame_times(config.loop),
         seed=tracker_seed(case, view),
         frame_step=config.tracking.frame_step,

@@ -30,6 +30,7 @@ from echotruth.repository.choice import Names, Sizes, chosen, image_size
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS, SCORES
 from echotruth.tracking.point_grid import grid_pixels, grid_positions
+from echotruth.units import mm
 
 SORTS = ("heart", "split", "group", "acoustics", "variation")
 """Labels of the table of cases that sort clips; `heart` is the one that distinguishes hearts."""
@@ -132,7 +133,7 @@ def clip_truth(repository: Repository, case: str, view: str) -> ClipTruth:
     case, view : str
     """
     config = repository.case(case).config
-    unit, plane = config.bmode.si().field_of_view / point_tracks.SIDE, config.views[view].plane
+    unit, plane = config.bmode.field_of_view_mm * mm / point_tracks.SIDE, config.views[view].plane
     stored = estimates.true(repository, case, view, "true_displacement", *(f"true_{name}" for name in COURSES))
     # Only those of frame 0, of which each frame is a chunk.
     at_ed = unpack(repository.read(f"truth/{config.bmode.sizes[0]}/labels", case, view, 0))

@@ -28,6 +28,7 @@ from echotruth.loop.cycle import frame_times
 from echotruth.repository import rounding
 from echotruth.repository.rounding import length_quantum
 from echotruth.tracking.point_grid import grid_positions
+from echotruth.units import mm
 
 if TYPE_CHECKING:
     from echotruth.repository.reader import Repository
@@ -140,7 +141,7 @@ def stored_truth(arrays: Mapping[str, Any], kind: str, config: Config) -> Truth:
     return Truth(
         inside=inside,
         wall=wall,
-        operator=StrainOperator(wall.position, axes, RADIUS * config.bmode.si().field_of_view),
+        operator=StrainOperator(wall.position, axes, RADIUS * (config.bmode.field_of_view_mm * mm)),
         displacement=motion[..., :2],
         through_plane=motion[..., 2],
         strain=np.asarray(arrays["true_strain"][:, :, inside], float),
@@ -178,7 +179,7 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config
     long_axis = tuple(plane.axes[:2, 2] / np.linalg.norm(plane.axes[:2, 2])) if kind == "long_axis" else UPRIGHT
     centre = cavity_centroid(heart, plane)
     wall = WallPoints(position[inside], layer, segment, centre, kind, heart.layers, long_axis)
-    radius = RADIUS * config.bmode.si().field_of_view
+    radius = RADIUS * (config.bmode.field_of_view_mm * mm)
     operator = StrainOperator(wall.position, single(motion["wall_axes"][inside]), radius)
     displacement, through_plane = (
         single(motion[name][:, inside], quantum) for name in ("true_displacement", "through_plane")

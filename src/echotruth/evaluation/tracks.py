@@ -13,6 +13,7 @@ from echotruth.repository.datasets import dataset
 from echotruth.repository.estimates import NotEvaluated
 from echotruth.repository.reader import Repository
 from echotruth.tracking.point_grid import grid_positions
+from echotruth.units import mm
 
 _STRAIN, _ABOUT = ("frame", "axial", "lateral", "wall_component"), {"units": "1"}
 
@@ -44,7 +45,7 @@ def tracks(
 def _strain(axes: np.ndarray, grid: np.ndarray, config: Config) -> Callable[[np.ndarray], np.ndarray]:
     """Function from a displacement on the grid to its strain, (frame, axial, lateral, 3), at the points with axes."""
     inside = np.isfinite(axes).all((-2, -1))
-    radius = RADIUS * config.bmode.si().field_of_view
+    radius = RADIUS * (config.bmode.field_of_view_mm * mm)
     operator = StrainOperator(grid[inside], axes[inside].astype(float), radius)
 
     def strain(displacement: np.ndarray) -> np.ndarray:

@@ -27,7 +27,7 @@ from echotruth.inference.parameters import (
 )
 from echotruth.inference.segment_means import SEGMENTS, SegmentMeans
 from echotruth.repository.schema import DRAWS
-from echotruth.section import UNITS
+from echotruth.units import kPa
 
 MATERIAL, TENSION = "mechanics.material.stiffness_kPa", "active_tension_kPa"
 """C, and the active tension at end-systole, mean of the muscle, which follow from the parameters."""
@@ -219,7 +219,7 @@ def _named(mode: Mode, wall: _Wall, scaled: Floats, about: Floats, there: Predic
 
     slopes = there.derived_jacobian + _slopes(levels, mode.free, about)
     found = there.derived[:, None] + levels(about[None]) + slopes @ (scaled - about).T
-    return values | dict(zip((MATERIAL, TENSION), np.exp(found) / UNITS["kPa"], strict=True))
+    return values | dict(zip((MATERIAL, TENSION), np.exp(found) / kPa, strict=True))
 
 
 def _slopes(function: Callable[[Floats], Floats], free: Sequence[Parameter], about: Floats) -> Floats:

@@ -24,7 +24,7 @@ from echotruth.inference.parameters import Parameter, slopes
 from echotruth.loop.cycle import heart_cycle, period, read_loop
 from echotruth.loop.recording import LoopError
 from echotruth.notebook.sensitivities import sensitivities
-from echotruth.section import UNITS
+from echotruth.units import mmHg, uL
 
 STEP = 1e-3
 """Change of a parameter, over the standard deviation of its prior, by which observations are differenced."""
@@ -98,7 +98,6 @@ def _measured(observed: xr.Dataset, given: Config, folder: Path) -> Loop:
         end = cycle.systole[-1]
     except LoopError as error:
         raise ObservationError(str(error).replace(str(path), name)) from None
-    mmHg, uL = UNITS["mmHg"], UNITS["uL"]
     return loop.model_copy(
         update={
             "edp_mmHg": float(pressure[0] / mmHg),

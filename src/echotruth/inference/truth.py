@@ -9,7 +9,8 @@ from echotruth.heart import Heart
 from echotruth.inference.draws import MATERIAL, TENSION
 from echotruth.inference.segment_means import means_of_cells
 from echotruth.repository.reader import Repository
-from echotruth.section import UNITS, value_of
+from echotruth.section import value_of
+from echotruth.units import kPa, mmHg, uL
 
 
 def truth(repository: Repository, case: str) -> dict[str, float]:
@@ -29,7 +30,6 @@ def _of_muscle(heart: Heart) -> dict[str, float]:
     stiffness_mean = float(np.exp(share[shown] @ np.log(stiffness[shown])))
     found = {f"contractility.{place + 1}": tension[place] / tension_mean for place in shown}
     found |= {f"stiffness.{place + 1}": stiffness[place] / stiffness_mean for place in shown}
-    kPa = UNITS["kPa"]
     found |= {
         MATERIAL: float(mechanics["stiffness"]) * stiffness_mean / kPa,
         TENSION: tension_mean / kPa,
@@ -40,7 +40,6 @@ def _of_muscle(heart: Heart) -> dict[str, float]:
 def _of_keys(case: Case, heart: Heart) -> dict[str, float]:
     """Values of keys of the configuration, and of the loop at end-diastole and end-systole."""
     pressure, volume = heart.arrays["mechanics"]["pressure"], heart.arrays["mechanics"]["volume"]
-    mmHg, uL = UNITS["mmHg"], UNITS["uL"]
     found = {
         "loop.edp_mmHg": pressure[0] / mmHg,
         "loop.esp_mmHg": pressure[heart.es] / mmHg,

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from echotruth.repository.choice import Names, image_size, require_known
 from echotruth.repository.reader import Repository
+from echotruth.units import mm
 
 Item = dict[str, Any]
 """Name -> array, number or text."""
@@ -59,7 +60,7 @@ class Items(Sequence[Item]):
         config = self.repository.config
         self.size = image_size(config, size)
         self.frames = config.loop.frames
-        self.spacing = config.bmode.si().field_of_view / self.size
+        self.spacing = config.bmode.field_of_view_mm * mm / self.size
         """Distance of pixel centres, m."""
         given = cases.index if hasattr(cases, "columns") else cases
         ids = _complete(self.repository) if given is None else _listed(given)

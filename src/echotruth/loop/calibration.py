@@ -18,7 +18,6 @@ from echotruth.loop.circulation import (
     ARTERIES,
     LEFT_ATRIUM,
     LEFT_VENTRICLE,
-    MMHG,
     PULMONARY_ARTERIES,
     PULMONARY_VEINS,
     REFERENCE_STROKE_VOLUME,
@@ -30,6 +29,7 @@ from echotruth.loop.circulation import (
 from echotruth.loop.cycle import Cycle
 from echotruth.loop.phases import EJECTION, FILLING, RELAXATION, phases
 from echotruth.loop.recording import LoopError
+from echotruth.units import mmHg
 
 _MAX_NEWTON_STEPS = 60
 
@@ -125,7 +125,7 @@ def calibrate(cycle: Cycle, settings: Settings) -> tuple[Circulation, Cycle]:
     flow = (volume - np.roll(volume, 1)) / (cycle.period / len(volume))
     outflow, inflow = np.maximum(-flow, 0), np.maximum(flow, 0)
     ejects, fills = outflow > 0, inflow > 0
-    mitral_resistance = settings.si().mitral_gradient / inflow.max()
+    mitral_resistance = settings.mitral_gradient_mmHg * mmHg / inflow.max()
     behind = pressure + mitral_resistance * inflow
     ring = _healthy(cycle, pressure, outflow, float(behind[fills].mean()), settings)
     steady, pressures = _beat_of_flows(ring, outflow, inflow, np.where(fills, behind, np.nan))
@@ -190,22 +190,22 @@ def _healthy(cycle: Cycle, pressure: Floats, outflow: Floats, filling: float, se
     gained = kept * step / decay_time
     windkessel = _periodic(kept, gained, outflow) + settings.characteristic_share * outflow
     # Of a peripheral resistance of one: all pressures above those of the veins grow with it.
-    ejects, above = outflow > 0, pressure - VENOUS_PRESSURE * MMHG
+    ejects, above = outflow > 0, pressure - VENOUS_PRESSURE * mmHg
     resistance = float(np.sum(above[ejects] * windkessel[ejects]) / np.sum(windkessel[ejects] ** 2))
     compliance = decay_time / resistance
     elastance, unstressed = np.zeros((number, 8)), np.zeros(8)
     elastance[:, ARTERIES], elastance[:, VEINS] = 1 / compliance, 1 / (VENOUS_COMPLIANCE * compliance)
     for index, value in PULMONARY_COMPLIANCE.items():
-        elastance[:, index] = MMHG / (value * stroke_volume)
+        elastance[:, index] = mmHg / (value * stroke_volume)
     for index, chamber in CHAMBERS.items():
-        elastance[:, index] = chamber.elastance(np.arange(number) / number) * MMHG / stroke_volume
+        elastance[:, index] = chamber.elastance(np.arange(number) / number) * mmHg / stroke_volume
         unstressed[index] = chamber.unstressed * stroke_volume
     lost = np.zeros(8)
     lost[VEINS] = VENOUS_PRESSURE - RIGHT_ATRIAL_PRESSURE
     lost[[RIGHT_ATRIUM, RIGHT_VENTRICLE]] = VALVE_DROP
-    lost[PULMONARY_ARTERIES] = max(PULMONARY_PRESSURE - filling / MMHG, LEAST_PULMONARY_DROP)
+    lost[PULMONARY_ARTERIES] = max(PULMONARY_PRESSURE - filling / mmHg, LEAST_PULMONARY_DROP)
     lost[PULMONARY_VEINS] = PULMONARY_VEIN_DROP
-    conductance = np.divide(flow, lost * MMHG, out=np.zeros(8), where=lost > 0)
+    conductance = np.divide(flow, lost * mmHg, out=np.zeros(8), where=lost > 0)
     conductance[ARTERIES] = 1 / resistance
     nothing, volumes = np.zeros((number, 8)), np.ones(8) * stroke_volume
     volumes[ARTERIES] = compliance * resistance * flow

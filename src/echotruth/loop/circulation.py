@@ -34,7 +34,7 @@ import numpy as np
 from echotruth.arrays import Floats
 from echotruth.config.loop import Circulation as Settings
 from echotruth.loop.recording import LoopError
-from echotruth.section import UNITS
+from echotruth.units import mmHg
 
 (
     LEFT_VENTRICLE,
@@ -51,14 +51,11 @@ from echotruth.section import UNITS
 VALVES = np.isin(np.arange(8), (LEFT_VENTRICLE, RIGHT_ATRIUM, RIGHT_VENTRICLE, LEFT_ATRIUM))
 """Whether the flow out of a compartment (8,) passes a valve."""
 
-MMHG = UNITS["mmHg"]
-"""Pascals in a millimetre of mercury."""
-
 REFERENCE_STROKE_VOLUME = 70.0
 """Stroke volume, mL, at a period of 0.8 s of the heart of Regazzoni et al., by which parameters scale: that of the
 package `circulation` 0.4."""
 
-REFLEX_STEEPNESS, REFLEX_RANGE = 0.1838 / MMHG, (0.4, 1.6)
+REFLEX_STEEPNESS, REFLEX_RANGE = 0.1838 / mmHg, (0.4, 1.6)
 """k, 1/Pa, of the baroreflex, and the factors on the peripheral resistance between which it acts."""
 
 REFLEX_VOLUME = 400 / REFERENCE_STROKE_VOLUME

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from echotruth.config.anatomy import HEART_PRESETS
 from echotruth.config.loop import Loop, Prescribed
 from echotruth.loop.phases import es_frame
 from echotruth.loop.recording import LoopError, Recording, read
+from echotruth.units import mmHg, per_min, uL
 
 SHIPPED = Path(__file__).parent / "recordings"
 
@@ -226,20 +226,20 @@ def recorded_curves(loop: Loop, size: float = 1.0) -> dict[str, Floats | None]:
     LoopError
         If the file cannot be read or its curves are not valid.
     """
-    recording, si = _read_recording(loop), loop.si()
+    recording = _read_recording(loop)
     curves = {quantity: recording.si(quantity) for quantity in ("time", *_CURVES)}
     if curves["pressure"] is not None:
-        curves["pressure"] = _map_pressure(recording.path, curves["pressure"], curves["volume"], si)
+        curves["pressure"] = _map_pressure(recording.path, curves["pressure"], curves["volume"], loop)
     if curves["volume"] is not None:
-        curves["volume"] = _map_volume(recording.path, curves["volume"], si, size)
+        curves["volume"] = _map_volume(recording.path, curves["volume"], loop, size)
     return curves
 
 
 def _period(recording: Recording, loop: Loop) -> float:
     """Duration of a cycle, s."""
-    time, rate = recording.si("time"), loop.si().heart_rate
+    time, rate = recording.si("time"), loop.heart_rate_per_min
     assert time is not None
-    return float(time[-1]) if rate is None else 1 / rate
+    return float(time[-1]) if rate is None else 1 / (rate * per_min)
 
 
 def _read_recording(loop: Loop) -> Recording:
@@ -307,26 +307,27 @@ def _check_end_diastole(recording: Recording) -> None:
             raise LoopError(f"{recording.path}: {first}; {remedy}.")
 
 
-def _map_volume(path: Path, volume: Floats, si: SimpleNamespace, size: float) -> Floats:
-    """Volumes mapped linearly so that the first is `si.edv` and the smallest `si.esv` (m^3), by default those of the
+def _map_volume(path: Path, volume: Floats, loop: Loop, size: float) -> Floats:
+    """Volumes mapped linearly so that the first is `edv_uL` and the smallest `esv_uL`, by default those of the
     file times a factor."""
     first, smallest = volume[0], volume.min()
-    edv = size * first if si.edv is None else si.edv
-    esv = size * smallest if si.esv is None else si.esv
+    edv = size * first if loop.edv_uL is None else loop.edv_uL * uL
+    esv = size * smallest if loop.esv_uL is None else loop.esv_uL * uL
     if esv >= edv:
         volumes = f"the end-systolic volume is {esv * 1e9:g} uL and the end-diastolic {edv * 1e9:g} uL"
         raise LoopError(f"{path}: {volumes}; set edv_uL and esv_uL so that the heart ejects.")
     return esv + (volume - smallest) * ((edv - esv) / (first - smallest))
 
 
-def _map_pressure(path: Path, pressure: Floats, volume: Floats | None, si: SimpleNamespace) -> Floats:
-    """Pressures mapped so that the first is `si.edp` and that of end-systole `si.esp` (Pa).
+def _map_pressure(path: Path, pressure: Floats, volume: Floats | None, loop: Loop) -> Floats:
+    """Pressures mapped so that the first is `edp_mmHg` and that of end-systole `esp_mmHg`.
 
     Up to the first they are scaled, so that they stay positive; above it the map is linear.
     """
     first = pressure[0]
     last = float(pressure.max()) if volume is None else float(pressure[es_frame(pressure, volume)])
-    edp, esp = first if si.edp is None else si.edp, last if si.esp is None else si.esp
+    edp = first if loop.edp_mmHg is None else loop.edp_mmHg * mmHg
+    esp = last if loop.esp_mmHg is None else loop.esp_mmHg * mmHg
     if esp <= edp:
         pressures = f"the end-systolic pressure is {esp:.4g} Pa and the end-diastolic {edp:.4g} Pa"
         raise LoopError(f"{path}: {pressures}; set edp_mmHg and esp_mmHg so that the pressure rises.")

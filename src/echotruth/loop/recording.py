@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.section import UNITS
+from echotruth.units import UNITS
 
 if TYPE_CHECKING:
     import pandas as pd

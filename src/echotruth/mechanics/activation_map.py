@@ -26,6 +26,7 @@ from echotruth.fem.tetrahedra import NODE_XI, PARTS, Integers, Mesh, straight_tr
 from echotruth.mechanics import fibres
 from echotruth.mechanics.eikonal import arrival_times
 from echotruth.mechanics.pathology import HEALTHY, LATE, PathologyError, Tissue, wall_point
+from echotruth.units import deg, ms
 
 SITES = {
     "normal": [
@@ -103,11 +104,11 @@ def _metric(fibre: Floats, activation: Activation) -> Floats:
 
 def _around(mesh: Mesh, depth: Floats, site: Site, metric: Floats) -> tuple[Integers, Floats]:
     """Nodes of the cell in which a site lies, and the times (10,), s, at which they are reached from it."""
-    point = wall_point(mesh, depth, site.position, site.si().azimuth, site.depth)
+    point = wall_point(mesh, depth, site.position, site.azimuth_deg * deg, site.depth)
     if point is None:
         where = f"position = {site.position} and azimuth_deg = {site.azimuth_deg}"
         raise PathologyError(f"pathology.activation.sites: no wall at {where}: move the site towards the base.")
     cell = locate(mesh.nodes, mesh.cells, point[None]).cell[0]
     nodes = mesh.cells[cell]
     way = mesh.nodes[nodes] - point
-    return nodes, site.si().time + np.sqrt(np.einsum("ai,ij,aj->a", way, metric[cell], way))
+    return nodes, site.time_ms * ms + np.sqrt(np.einsum("ai,ij,aj->a", way, metric[cell], way))

@@ -107,8 +107,8 @@ def unloaded_wall(config: Config, cycle: Cycle) -> Wall:
     mesh = thinned(fillable_ventricle(config), config.pathology.infarct)
     logger.info("%d tetrahedra, %d nodes", len(mesh.cells), len(mesh.nodes))
     if config.geometry.given_state == "end_diastole":
-        assert cycle.pressure is not None
-        stiffness = config.mechanics.material.si().stiffness
+        stiffness = config.mechanics.material.stiffness
+        assert cycle.pressure is not None and stiffness is not None
         mesh = unload(mesh, lambda guess: equilibrium(config, wall(config, guess)), cycle.pressure[0], stiffness)
     return wall(config, mesh)
 
@@ -184,7 +184,7 @@ def _healthy_beat(config: Config, unloaded: Wall, cycle: Cycle) -> tuple[SolvedC
     """A healthy heart in its loop, and the stretch along its fibres since ED, (n_frames, n_cells)."""
     equations, nodes = equilibrium(config, unloaded), unloaded.mesh.nodes
     try:
-        solved = solve(equations, cycle, unloaded.tissue.tension_scale, config.mechanics.material.si().stiffness)
+        solved = solve(equations, cycle, unloaded.tissue.tension_scale, config.mechanics.material.stiffness)
     finally:
         equations.close()
     stretch = np.array([fibre_stretch(nodes + moved, equations.elements) for moved in solved.displacement])
@@ -192,7 +192,7 @@ def _healthy_beat(config: Config, unloaded: Wall, cycle: Cycle) -> tuple[SolvedC
 
 
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
-    stiffness = config.mechanics.material.si().stiffness
+    stiffness = config.mechanics.material.stiffness
     if stiffness is None and np.isin(unloaded.tissue.region, (INFARCT, BORDER)).any():
         stiffness = _healthy_stiffness(config, cycle)
     equations = equilibrium(config, unloaded)

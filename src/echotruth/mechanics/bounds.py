@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from echotruth.arrays import Floats
 from echotruth.config.physiology import Physiology
-from echotruth.section import UNITS
+from echotruth.units import UNITS
 
 RR, CC, LL, RC, RL, CL = range(6)
 """Indices of the components of strain."""

@@ -12,6 +12,7 @@ from echotruth.config import Fibres
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics import angles, disarray
+from echotruth.units import deg, mm
 
 CENTROID = np.full((1, 3), 0.25)
 """Local coordinates of the centroid of a tetrahedron."""
@@ -168,10 +169,13 @@ def rule_angles(fibres: Fibres, depth: Floats) -> tuple[Floats, Floats, Floats]:
     helix, transverse, sheet : ndarray of that shape, rad
         endo + (epi - endo) depth; with `stepwise`, with the depth of the middle of the layer.
     """
-    si = fibres.si()
     at = (layer(depth, fibres.layers) - 0.5) / fibres.layers if fibres.stepwise else depth
-    ends = ((si.endo, si.epi), (si.transverse_endo, si.transverse_epi), (si.sheet_endo, si.sheet_epi))
-    helix, transverse, sheet = (endo + (epi - endo) * at for endo, epi in ends)
+    ends = (
+        (fibres.endo_deg, fibres.epi_deg),
+        (fibres.transverse_endo_deg, fibres.transverse_epi_deg),
+        (fibres.sheet_endo_deg, fibres.sheet_epi_deg),
+    )
+    helix, transverse, sheet = (endo * deg + (epi * deg - endo * deg) * at for endo, epi in ends)
     return helix, transverse, sheet
 
 
@@ -209,11 +213,10 @@ def fibre_frames(mesh: Mesh, depth: Floats, fibres: Fibres, xi: Floats, seed: in
         frames = np.repeat(of_cell[:, None], len(xi), axis=1)
     else:
         frames = angles.frames_from_angles(axes, *rule_angles(fibres, interpolate_in_cells(mesh, depth, xi)))
-    si = fibres.si()
-    if si.disarray:
+    if fibres.disarray_deg:
         positions = np.einsum("qa,cai->cqi", shape(xi), mesh.nodes[mesh.cells])
-        angle = si.disarray * disarray.random_field(positions, si.disarray_length, seed)
-        frames = disarray.rotate(frames, axes[..., 0, :], angle)
+        field = disarray.random_field(positions, fibres.disarray_length_mm * mm, seed)
+        frames = disarray.rotate(frames, axes[..., 0, :], fibres.disarray_deg * deg * field)
     return frames
 
 

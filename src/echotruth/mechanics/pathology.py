@@ -13,6 +13,7 @@ from echotruth.config.regional import Regional
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import NODE_XI, Floats, MaterialPoints, Mesh, interpolate, shape
 from echotruth.mechanics.fibres import material_gradients, wall_depth
+from echotruth.units import deg, mm
 
 HEALTHY, INFARCT, BORDER, LATE = range(4)
 """Regions; where they overlap, infarct takes precedence over border zone, and border zone over late activation."""
@@ -155,7 +156,7 @@ def _infarct_weight(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
     """Weight (n_cells,) of the infarct: 1 in it, falling linearly to 0 through the border zone (Lee 2011)."""
     if not infarct.is_there:
         return np.zeros(len(mesh.cells))
-    values, border = shape(_SAMPLES), infarct.si().border
+    values, border = shape(_SAMPLES), infarct.border_mm * mm
     positions = values @ mesh.nodes[mesh.cells]
     too_deep = np.clip(depth[mesh.cells] @ values.T, 0, 1) > infarct.transmurality
     infarcted = _in_region(mesh, depth, infarct, positions) & ~too_deep
@@ -175,7 +176,8 @@ def _in_region(mesh: Mesh, depth: Floats, infarct: Infarct, positions: Floats) -
     """Whether positions (..., 3), m, are in the segments or the sphere of the infarct, at any depth."""
     if infarct.segments is not None:
         return np.isin(segment(positions, _apex(mesh)), infarct.segments)
-    return np.linalg.norm(positions - infarct_centre(mesh, depth, infarct), axis=-1) <= infarct.si().radius
+    assert infarct.radius_mm is not None
+    return np.linalg.norm(positions - infarct_centre(mesh, depth, infarct), axis=-1) <= infarct.radius_mm * mm
 
 
 def infarct_centre(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
@@ -186,7 +188,7 @@ def infarct_centre(mesh: Mesh, depth: Floats, infarct: Infarct) -> Floats:
     PathologyError
         If there is no wall in that direction.
     """
-    centre = wall_point(mesh, depth, infarct.position, infarct.si().azimuth, 0.5)
+    centre = wall_point(mesh, depth, infarct.position, infarct.azimuth_deg * deg, 0.5)
     if centre is None:
         raise PathologyError(_no_cell(infarct))
     return centre

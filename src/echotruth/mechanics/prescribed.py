@@ -14,6 +14,7 @@ from echotruth.mechanics.geometry.lattice import Tube, tube_dimensions
 from echotruth.mechanics.outputs import Arrays, collect_outputs
 from echotruth.mechanics.pathology import thinned
 from echotruth.mechanics.solver.wall import wall
+from echotruth.units import deg, mm, um
 
 
 class MotionError(ValueError):
@@ -133,10 +134,9 @@ def displacement_at(config: Config, mesh: Mesh, positions: Floats, amplitude: fl
 
 def rigid(section: Rigid, positions: Floats, amplitude: float) -> Floats:
     """Displacement (Q(a angle) - I) x + a shift of positions x (..., 3), m, with a rotation Q about the long axis."""
-    si = section.si()
-    shift = np.array([si.lateral, si.axial, si.elevation]) @ SHORT_AXIS
+    shift = np.array([section.lateral_um, section.axial_um, section.elevation_um]) * um @ SHORT_AXIS
     # The long axis points to the base: seen from the apex, rotation about it is clockwise.
-    return positions @ (_rotation_about_z(-amplitude * si.rotation) - np.eye(3)).T + amplitude * shift
+    return positions @ (_rotation_about_z(-amplitude * (section.rotation_deg * deg)) - np.eye(3)).T + amplitude * shift
 
 
 def affine(section: Affine, offsets: Floats, amplitude: float) -> Floats:
@@ -168,14 +168,15 @@ def tube_motion(section: TubeMotion, tube: Tube, positions: Floats, amplitude: f
     -------
     ndarray of shape (..., 3), m
     """
-    si, (x, y, z) = section.si(), np.moveaxis(positions, -1, 0)
-    inner, stretch = tube.inner * (1 - amplitude * si.contraction), 1 - amplitude * si.shortening
+    x, y, z = np.moveaxis(positions, -1, 0)
+    inner, stretch = tube.inner * (1 - amplitude * section.contraction), 1 - amplitude * section.shortening
     square = x**2 + y**2
     # r^2 - R^2, so that r is R to the last bit where nothing moves.
     difference = inner**2 - tube.inner**2 + (square - tube.inner**2) * (1 / stretch - 1)
     r_over_R = np.sqrt(1 + difference / square)
     from_outside = (tube.outer - np.sqrt(square)) / (tube.outer - tube.inner)
-    angle = amplitude * (si.torsion * z / tube.length - si.endo_rotation * from_outside)
+    torsion, endo_rotation = section.torsion_deg * deg, section.endo_rotation_deg * deg
+    angle = amplitude * (torsion * z / tube.length - endo_rotation * from_outside)
     cos, sin = r_over_R * np.cos(angle), r_over_R * np.sin(angle)
     return np.stack([(cos - 1) * x - sin * y, sin * x + (cos - 1) * y, (stretch - 1) * z], axis=-1)
 
@@ -190,7 +191,7 @@ def _check_clearance(config: Config, mesh: Mesh, displacement: Floats) -> None:
     """Refuse a motion that could bring the wall to an array, which stands at the distance of the focus in all views."""
     apex = mesh.nodes[mesh.endo, 2].min()
     extent = max(np.hypot(*mesh.nodes[:, :2].T).max(), np.abs(mesh.nodes[:, 2] - apex / 2).max())
-    clearance, largest = config.rf.si().focus - extent, np.linalg.norm(displacement, axis=-1).max()
+    clearance, largest = config.rf.focus_mm * mm - extent, np.linalg.norm(displacement, axis=-1).max()
     if largest >= clearance:
         raise MotionError(
             f"motion.{config.motion.kind} moves the wall by up to {largest * 1e3:.3g} mm, and it is "

@@ -51,7 +51,7 @@ def sensitivities(
         As :func:`.beat.beat`.
     """
     check_frames(config, frames)
-    whole, stiffness = heart_cycle(config), config.mechanics.material.si().stiffness
+    whole, stiffness = heart_cycle(config), config.mechanics.material.stiffness
     cycle = whole.at(frames)
     unloaded, steps = unloaded_wall(config, cycle), list[Step]()
     equations, exact = equilibrium(config, unloaded), equilibrium(config, unloaded, exact=True)
@@ -110,7 +110,7 @@ class _Heart:
             if same
             else equilibrium(other, wall)
         )
-        cycle, given = heart_cycle(other).at(frames), section.material.si().stiffness
+        cycle, given = heart_cycle(other).at(frames), section.material.stiffness
         return Variant(equations, cycle, wall.tissue.tension_scale, change, given)
 
     def arrays(self, wall: Wall, derivative: Derivative, change: float) -> Arrays:

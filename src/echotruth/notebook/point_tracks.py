@@ -8,6 +8,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.tracks import follow, visible
 from echotruth.notebook.arguments import check_clip, check_heart
 from echotruth.repository.datasets import case_of, imaged_heart
+from echotruth.units import mm
 
 SEEN = "whether the point is within the field of view, the scan and the slice"
 
@@ -60,7 +61,7 @@ def point_tracks(
     if thickness is not None and not thickness > 0:
         raise ValueError(f"thickness = {thickness}: give a positive length, in m.")
     first = np.array([clip["lateral"].values[0], clip["axial"].values[0]])
-    spacing = case.config.bmode.si().field_of_view / clip.sizes["axial"]
+    spacing = case.config.bmode.field_of_view_mm * mm / clip.sizes["axial"]
     followed = follow(moving.nodes + moving.displacement, heart.cells, plane, first + given * spacing, start)
     position = followed[..., :2]
     tracks = xr.Dataset(

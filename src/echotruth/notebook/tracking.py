@@ -18,6 +18,7 @@ from echotruth.repository.datasets import as_stored, case_of, dataset, imaged_he
 from echotruth.tracking.plausibility import doubts
 from echotruth.tracking.point_grid import grid_points
 from echotruth.tracking.tracker import track as track_points
+from echotruth.units import mm
 
 
 def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", **options: Any) -> xr.Dataset:
@@ -74,7 +75,7 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     check_whole(clip, case.config)
     inside, size = clip["grid_mask"].values, clip.sizes["axial"]
     points = grid_points(case.config, size)[inside]
-    spacing = case.config.bmode.si().field_of_view / size
+    spacing = case.config.bmode.field_of_view_mm * mm / size
     seed = tracker_seed(case, clip.attrs["view"])
     image, mask = (clip[name].transpose("frame", "axial", "lateral").values for name in ("image", "mask"))
     if (unknown := np.isnan(image).any(axis=(1, 2))).any():

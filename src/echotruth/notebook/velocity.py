@@ -19,6 +19,7 @@ from echotruth.notebook.arguments import check_clip, check_heart, check_whole
 from echotruth.notebook.simulation import progress_line
 from echotruth.repository.datasets import case_of, imaged_heart
 from echotruth.seeds import generator
+from echotruth.units import MHz, mm
 
 HEADROOM = 1.25
 """Default of the Nyquist velocity over the greatest true velocity in the cycle."""
@@ -136,8 +137,8 @@ def _prf(config: Config, packet: int, moving: MovingHeart, scan: Scan, given: fl
     """Pulse repetition frequency, Hz: the one given, or the default, once it and the packet are possible."""
     if not isinstance(packet, (int, np.integer)) or packet < 2:
         raise ValueError(f"packet = {packet!r}: give a whole number of pulses, two or more.")
-    p, depth = config.probe.si(), config.bmode.si().field_of_view
-    lowest, highest = packet / moving.period, p.sound_speed / (2 * depth)
+    p, depth = config.probe, config.bmode.field_of_view_mm * mm
+    lowest, highest = packet / moving.period, p.sound_speed_m_per_s / (2 * depth)
     if lowest > highest:
         most = f"give at most {floor(highest * moving.period)}, which fit into a cycle at {floor(highest)} Hz"
         raise ValueError(f"packet = {packet}: {most}.")
@@ -154,6 +155,6 @@ def _prf(config: Config, packet: int, moving: MovingHeart, scan: Scan, given: fl
     fastest = float(np.max(speed, initial=0.0, where=np.isfinite(speed)))
     if not fastest > 0:
         raise ValueError("No wall in this view moves along the beam, to which prf_Hz would be fitted: give prf_Hz.")
-    least = 4 * p.frequency / p.sound_speed * HEADROOM * fastest
+    least = 4 * (p.frequency_MHz * MHz) / p.sound_speed_m_per_s * HEADROOM * fastest
     digit = 10.0 ** (floor(log10(least)) - 1)
     return min(max(ceil(least / digit) * digit, lowest), highest)

@@ -17,6 +17,7 @@ from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS
 from echotruth.tracking.point_grid import grid_points
+from echotruth.units import mm
 
 ARROW_SPACING = 0.0375
 """Smallest distance of points whose motion is drawn, over the side of the image: 0.45 mm for a mouse."""
@@ -81,7 +82,7 @@ def with_motion(repository: Repository, case: str, view: str, size: int) -> tupl
     time = repository.read(f"{group}/time", case, view)
     motion = estimates.true(repository, case, view, "true_displacement")["true_displacement"][..., :2]
     inside = np.isfinite(motion[0]).all(-1)
-    spacing = config.bmode.si().field_of_view / size
+    spacing = config.bmode.field_of_view_mm * mm / size
     position = grid_points(config, size)[inside]
     return ClipWithMotion(image, spacing, time, position, motion[:, inside].astype(float)), inside
 

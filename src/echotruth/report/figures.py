@@ -39,6 +39,7 @@ from echotruth.repository import estimates, inferred
 from echotruth.repository.choice import main_view
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS, observations
+from echotruth.units import mm
 
 OF_HEARTS = ("clip", "loop", "strain", "physiology", "population", "heart", "views")
 """Figures of hearts and of their images."""
@@ -181,7 +182,7 @@ class Figures:
             pictures[view] = [found.isel(frame=frame) for frame in (0, self.shown.es)]
             plane = found.attrs["plane_origin"], found.attrs["plane_axes"][6:]
             places[view] = views.where(self.shown, settings.plane, *plane)
-        return views.draw(pictures, places, self.config.bmode.si().field_of_view)
+        return views.draw(pictures, places, self.config.bmode.field_of_view_mm * mm)
 
     @cached_property
     def standings(self) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from echotruth.report.palette import BORDER, FLOW, MOTION, TRACKED  # noqa: F401
-from echotruth.section import UNITS
+from echotruth.units import mmHg
 
 INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
 """Colours of text and axes, of remarks, of grid lines, of shaded spans, and of the paper."""
@@ -97,7 +97,7 @@ QUANTITIES = {
 """Green-Lagrange strain of the tissue by its components, strain of the mid-wall contour (docs/metrics.md), and
 rotation, which is positive counter-clockwise as seen from the apex."""
 
-FACTORS = {"%": 100.0, "°": float(np.degrees(1)), "mmHg": 1 / UNITS["mmHg"], "µL": 1e9, "mL": 1e6}
+FACTORS = {"%": 100.0, "°": float(np.degrees(1)), "mmHg": 1 / mmHg, "µL": 1e9, "mL": 1e6}
 """Unit -> factor from SI."""
 
 MAX_VOLUME_IN_UL = 2e-6

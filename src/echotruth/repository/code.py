@@ -18,7 +18,7 @@ PACKAGE = Path(__file__).parents[1]
 PASSING = tuple(f"echotruth.{name}" for name in ("cases", "config", "extras", "files", "repository", "workflow"))
 """Modules and packages that pass numbers on."""
 
-COUNTED = ("repository/rounding.py", "repository/arrays.csv", "section.py")
+COUNTED = ("repository/rounding.py", "repository/arrays.csv", "units.py")
 """What counts for every stage, imported or not: the quanta of what is stored, and the units of the configuration."""
 
 _COMPILED = re.compile(

@@ -7,8 +7,8 @@ from echotruth.config import Config
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import frame_times
 from echotruth.repository import schema, scores
-from echotruth.section import unit_of
 from echotruth.tracking.point_grid import grid_positions
+from echotruth.units import unit_of
 
 _UNITS = {unit: unit for unit in ("um", "mm", "uL", "ms", "mmHg", "kPa", "MHz", "dB")}
 _UNITS |= {"per_mm3": "mm-3", "per_min": "min-1", "m_per_s": "m s-1", "deg": "degree"}

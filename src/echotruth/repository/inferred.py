@@ -10,7 +10,7 @@ import pandas as pd
 
 from echotruth.repository import schema
 from echotruth.repository.choice import image_size
-from echotruth.section import UNITS
+from echotruth.units import UNITS
 
 if TYPE_CHECKING:
     from echotruth.repository.reader import Repository

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from echotruth.config import Config
 from echotruth.repository.array import Array
+from echotruth.units import mm
 
 LENGTH = "pixel/256"
 """Quantum of lengths in the image: the largest power of two, in metres, not above 1/256 pixel of the largest image."""
@@ -36,7 +37,7 @@ def quantum(array: Array, config: Config) -> float | None:
 
 def length_quantum(config: Config) -> float:
     """Largest power of two that is not above 1/256 of the pixel of the largest image, m."""
-    pixel = config.bmode.si().field_of_view / max(config.bmode.sizes)
+    pixel = config.bmode.field_of_view_mm * mm / max(config.bmode.sizes)
     return float(2.0 ** floor(log2(pixel / 256)))
 
 

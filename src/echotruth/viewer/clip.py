@@ -13,6 +13,7 @@ from echotruth.imaging.labels import LABELS
 from echotruth.repository import estimates, schema
 from echotruth.repository.group import NotWritten
 from echotruth.repository.reader import Repository
+from echotruth.units import mm
 
 Floats32 = NDArray[np.float32]
 PARTS = {"bmode": "images", "truth": "truth at the pixels", "tracking": "tracked motion and its scores"}
@@ -63,7 +64,7 @@ class Clip:
     @cached_property
     def side(self) -> float:
         """Length of a side of the image, m."""
-        return float(self.config.bmode.si().field_of_view)
+        return float(self.config.bmode.field_of_view_mm * mm)
 
     @cached_property
     def is_short_axis(self) -> bool:

@@ -8,7 +8,7 @@ from echotruth.config import Geometry
 from echotruth.fem.tetrahedra import Floats, Mesh
 from echotruth.mechanics.geometry.mesh_quality import check_cavity, check_inverted
 from echotruth.mechanics.geometry.template import ellipse_angle, mesh_wall
-from echotruth.section import UNITS
+from echotruth.units import mm
 
 
 def ellipsoid(geometry: Geometry) -> Mesh:
@@ -47,7 +47,7 @@ def semi_axes(geometry: Geometry) -> tuple[tuple[float, float, float], tuple[flo
     endo, epi : tuple of float, m
         The cavity is dilated and elongated, the wall is added, and the result is scaled.
     """
-    size = {key: value * UNITS["mm"] * geometry.scale for key, value in geometry.lengths().items()}
+    size = {key: value * mm * geometry.scale for key, value in geometry.lengths().items()}
     elongation = geometry.dilation * geometry.elongation
     radius, length = size["endo_radius_mm"] * geometry.dilation, size["endo_length_mm"] * elongation
     wall, apex_wall = (size[key] * geometry.hypertrophy for key in ("wall_mm", "apex_wall_mm"))

@@ -15,6 +15,7 @@ from echotruth.config import Mechanics
 from echotruth.fem.quadrature import triangle
 from echotruth.fem.tetrahedra import Integers, Mesh, shape, shape_gradient
 from echotruth.mechanics.solver.assembly import BASE, EPI
+from echotruth.units import kPa_per_mm, kPa_s_per_mm
 
 Direction = Callable[[Floats, Floats], Floats]
 
@@ -44,14 +45,17 @@ class Springs:
 
 def surroundings(mesh: Mesh, section: Mechanics) -> tuple[Springs, ...]:
     """Springs of a configuration: of the pericardium, and of an elastic base."""
-    springs, pericardium = [], section.pericardium.si()
-    if pericardium.spring or pericardium.dashpot:
+    springs, pericardium = [], section.pericardium
+    spring, dashpot = pericardium.spring_kPa_per_mm * kPa_per_mm, pericardium.dashpot_kPa_s_per_mm * kPa_s_per_mm
+    if spring or dashpot:
         unit = surface_matrix(mesh, mesh.epi, normal)
-        springs.append(Springs(EPI, mesh.epi, pericardium.spring * unit, pericardium.dashpot * unit, True))
+        springs.append(Springs(EPI, mesh.epi, spring * unit, dashpot * unit, True))
     if section.base == "elastic":
-        base = section.elastic_base.si()
-        stiffness = base.axial_spring * surface_matrix(mesh, mesh.base, axial)
-        stiffness += base.circumferential_spring * surface_matrix(mesh, mesh.base, circumferential)
+        base = section.elastic_base
+        stiffness = base.axial_spring_kPa_per_mm * kPa_per_mm * surface_matrix(mesh, mesh.base, axial)
+        stiffness += (
+            base.circumferential_spring_kPa_per_mm * kPa_per_mm * surface_matrix(mesh, mesh.base, circumferential)
+        )
         springs.append(Springs(BASE, mesh.base, stiffness, np.zeros_like(stiffness), False))
     return tuple(springs)
 

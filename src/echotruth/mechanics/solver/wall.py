@@ -17,6 +17,7 @@ from echotruth.mechanics.solver.active_stress import ActiveLaw
 from echotruth.mechanics.solver.equilibrium import Equilibrium
 from echotruth.mechanics.solver.support import base_support
 from echotruth.mechanics.solver.surroundings import surroundings
+from echotruth.units import kPa
 
 
 @dataclass(frozen=True)
@@ -69,10 +70,10 @@ def equilibrium(config: Config, wall: Wall, exact: bool = False) -> Equilibrium:
 def wall_law(section: Mechanics) -> element.WallLaw:
     """Laws of the wall, SI, from their section of the configuration."""
     active = active_law(section.active)
-    material, si = section.material, section.si()
-    bulk = si.bulk_modulus, si.pointwise_bulk_ratio
+    passive = compiled(section.material.law), section.material.constants()
+    volumetric = section.bulk_modulus_kPa * kPa, section.pointwise_bulk_ratio
     cross_fibre = np.array([section.active.sheet_share, section.active.normal_share])
-    return element.WallLaw(compiled(material.law), material.constants(), active, *bulk, si.viscosity, cross_fibre)
+    return element.WallLaw(*passive, active, *volumetric, section.viscosity_Pa_s, cross_fibre)
 
 
 def active_law(section: Active) -> ActiveLaw:

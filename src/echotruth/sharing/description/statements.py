@@ -10,8 +10,8 @@ import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth.config import Config, shipped
-from echotruth.section import unit_of
 from echotruth.sharing.description.facts import Facts
+from echotruth.units import unit_of
 
 MARK = "<!-- Made by echotruth describe. -->\n"
 """First line of the data card, by which the file is known as one that may be replaced."""

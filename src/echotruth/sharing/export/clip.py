@@ -15,6 +15,7 @@ from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
 from echotruth.notebook.point_tracks import point_tracks
 from echotruth.repository.reader import Repository
+from echotruth.units import mm
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ class ExportedClip:
     @property
     def spacing(self) -> float:
         """Distance of pixel centres, m, the same in both directions."""
-        return float(self.case.config.bmode.si().field_of_view) / self.size
+        return float(self.case.config.bmode.field_of_view_mm * mm) / self.size
 
     @property
     def axial(self) -> Floats:

@@ -15,6 +15,7 @@ import numpy as np
 import echotruth
 from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import optional
+from echotruth.units import MHz
 
 US_MULTI_FRAME = "1.2.840.10008.5.1.4.1.1.3.1"
 """SOP class Ultrasound Multi-frame Image Storage."""
@@ -120,7 +121,7 @@ def _calibrate(region: Any, clip: ExportedClip) -> None:
     region.ReferencePixelX0 = region.ReferencePixelY0 = 0
     region.ReferencePixelPhysicalValueX = CM * float(clip.lateral[0])
     region.ReferencePixelPhysicalValueY = CM * float(clip.axial[0])
-    region.TransducerFrequency = round(clip.case.config.probe.si().frequency / 1e3)  # kHz
+    region.TransducerFrequency = round(clip.case.config.probe.frequency_MHz * MHz / 1e3)  # kHz
 
 
 def _heart(clip: ExportedClip) -> tuple[bytes, ...]:

@@ -17,6 +17,7 @@ from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import MIN_STD, amplitudes
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.window_deformation import PreparedImage, WindowDeformationTracker, window_passes
+from echotruth.units import mm
 
 MIN_HALF = 8
 """Smallest half side of a subset, px: six unknowns need more texture than two."""
@@ -31,7 +32,7 @@ INITIAL_WINDOWS = (1.5, 0.75)
 
 def track(clip: TrackerInput, settings: AffineDic) -> Path:
     """Path of the points of a clip, with the correlation of the subsets; raises as :func:`window_passes`."""
-    half = max(MIN_HALF, round(settings.si().subset / clip.spacing / 2))
+    half = max(MIN_HALF, round(settings.subset_mm * mm / clip.spacing / 2))
     sides = [ratio * 2e3 * half * clip.spacing for ratio in INITIAL_WINDOWS]
     windows = WindowDeformation(windows_mm=sides, final_passes=1)
     initial = WindowDeformationTracker(window_passes(windows, clip.shape, clip.spacing))

@@ -52,6 +52,7 @@ from echotruth.tracking.region import WallRegion, wall_region
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.dis import MIN_IMAGE_SIDE, optical_flow
 from echotruth.tracking.visibility import Visibility, visibility
+from echotruth.units import mm, um
 
 MIN_KNOT_SPACING = 5.0
 """px; closer knots have more unknowns than the image has information."""
@@ -117,29 +118,28 @@ def lost(clip: TrackerInput) -> Path:
 def follow(clip: TrackerInput, settings: BsplineDic) -> "BothWays":
     """Track the wall of a clip, which must have some, both ways or forwards only."""
     mask, spacing = clip.mask, clip.spacing
-    values = settings.si()
-    blur = values.blur_px * np.sqrt(max(0.0, 1 - (values.speckle_pixel / spacing) ** 2))
-    knot_spacing = max(values.knots / spacing, MIN_KNOT_SPACING)
-    region = wall_region(mask, knot_spacing, values.margin / spacing, values.transmural_scale)
+    blur = settings.blur_px * np.sqrt(max(0.0, 1 - (settings.speckle_pixel_um * um / spacing) ** 2))
+    knot_spacing = max(settings.knots_mm * mm / spacing, MIN_KNOT_SPACING)
+    region = wall_region(mask, knot_spacing, settings.margin_um * um / spacing, settings.transmural_scale)
     coarse_blur = COARSE_BLUR * knot_spacing
     ncc = NormalizedCrossCorrelation(
-        region.positions, region.inside, clip.points, 2 * knot_spacing, values.dynamic_range
+        region.positions, region.inside, clip.points, 2 * knot_spacing, settings.dynamic_range_dB
     )
     pixels = NormalizedCrossCorrelation(
         region.positions,
         np.ones(len(region.positions), bool),
         region.positions[::LIKENESS_STRIDE],
         LIKENESS_RADIUS * knot_spacing,
-        values.dynamic_range,
+        settings.dynamic_range_dB,
     )
     block = max(1, min(int(knot_spacing / FLOW_PIXELS_PER_KNOT), min(mask.shape) // MIN_IMAGE_SIDE))
 
     grey = grey_levels(clip.frames)
-    typical = rms(decompress(np.nan_to_num(grey[0][mask]), values.dynamic_range))
+    typical = rms(decompress(np.nan_to_num(grey[0][mask]), settings.dynamic_range_dB))
 
     def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        amplitude = decompress(np.nan_to_num(frame), values.dynamic_range)
-        even = even_gain(amplitude, values.gain / spacing, typical) if values.gain else amplitude
+        amplitude = decompress(np.nan_to_num(frame), settings.dynamic_range_dB)
+        even = even_gain(amplitude, settings.gain_mm * mm / spacing, typical) if settings.gain_mm else amplitude
         return block_mean(even, block), gaussian(even, blur), gaussian(amplitude, blur)
 
     with ThreadPoolExecutor(2) as threads:

@@ -17,6 +17,7 @@ from echotruth.tracking.accumulation import Path, follow
 from echotruth.tracking.grey import MIN_STD, amplitudes
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
+from echotruth.units import mm
 
 ROUNDING = 1e-9
 """Magnitude, relative to the largest, of a frequency that is rounding error and has a random phase."""
@@ -52,7 +53,8 @@ def window_side(settings: PhaseCorrelation, spacing: float) -> int:
     """
     if settings.window_px is not None:
         return settings.window_px
-    return max(MIN_WINDOW_SIDE, 2 * round(settings.si().window / spacing / 2))
+    assert settings.window_mm is not None
+    return max(MIN_WINDOW_SIDE, 2 * round(settings.window_mm * mm / spacing / 2))
 
 
 @dataclass(frozen=True)

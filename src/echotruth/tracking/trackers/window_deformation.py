@@ -20,6 +20,7 @@ from echotruth.tracking.field import DisplacementField, displacement_field, repl
 from echotruth.tracking.grey import amplitudes
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.windows import MIN_WINDOW_SIDE, Windows, arrange
+from echotruth.units import mm
 
 STRIDE = 0.5
 """Step between windows over their side."""
@@ -78,7 +79,7 @@ def window_sides(settings: WindowDeformation, spacing: float) -> list[int]:
     list of int
         px, even, 8 at least.
     """
-    sides = [max(MIN_WINDOW_SIDE, 2 * round(side / spacing / 2)) for side in settings.si().windows]
+    sides = [max(MIN_WINDOW_SIDE, 2 * round(side * mm / spacing / 2)) for side in settings.windows_mm]
     return sides + sides[-1:] * (settings.final_passes - 1)
 
 
