@@ -10,7 +10,7 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import interpolate
 from echotruth.imaging.labels import unpack
 from echotruth.imaging.medium.wall import seed_volume
-from echotruth.imaging.truth import cavity_centroid, displacement, material_truth, pixel_truth
+from echotruth.imaging.truth import PixelTruth, cavity_centroid, displacement, material_truth, pixel_truth
 from echotruth.imaging.view import imaging_plane
 
 CONFIG = Config()
@@ -169,3 +169,10 @@ def test_the_region_of_disease_is_that_of_the_tissue_at_the_pixel(twisting_heart
     clear = np.abs(before[:, 0]) > 0.6e-3
     assert np.array_equal(ill["region"][ill["mask"]][clear], (before[clear, 0] > 0).astype(np.uint8))
     assert not ill["region"][~ill["mask"]].any() and ill["region"].dtype == np.uint8
+
+
+def test_asking_which_arrays_there_are_makes_none(twisting_heart, mid):
+    made = []
+    truth = PixelTruth(twisting_heart, mid, AXIS, AXIS - 6e-3, tissue=made.append)
+    assert all(name in truth for name in ("displacement", "strain", "labels", "flow", "tissue")) and not made
+    assert "stress" not in truth and "tissue" not in PixelTruth(twisting_heart, mid, AXIS[:2], AXIS[:2])

@@ -90,8 +90,8 @@ def _find(corner: Floats, derivatives: Floats, points: Floats, xi: Floats) -> tu
         dx_dxi = d[0] + d[1] * x[0] + d[2] * x[1] + d[3] * x[2]
         mean = (d[0] + dx_dxi) / 2
         residual = offset[:, left] - mean[0] * x[0] - mean[1] * x[1] - mean[2] * x[2]
-        determinant = _triple(*dx_dxi)
-        step = np.stack([_triple(residual, dx_dxi[a], dx_dxi[b]) / determinant for a, b in _CYCLE])
+        determinant = triple_product(*dx_dxi)
+        step = np.stack([triple_product(residual, dx_dxi[a], dx_dxi[b]) / determinant for a, b in _CYCLE])
         xi[:, left], change[left] = x + step, np.abs(step).max(axis=0)
         # As compiled: the next step would be round-off, or the method diverges.
         left = left[(change[left] >= 1e-12) & (change[left] <= 10)]
@@ -106,7 +106,8 @@ def _dot(a: Floats, b: Floats) -> Floats:
     return product
 
 
-def _triple(a: Floats, b: Floats, c: Floats) -> Floats:
+def triple_product(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Determinants (...) of matrices whose rows, of shape (3, ...), are given."""
     product: Floats = (
         a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
     )

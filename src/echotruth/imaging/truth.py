@@ -76,6 +76,9 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
     def __len__(self) -> int:
         return len(list(iter(self)))
 
+    def __contains__(self, name: object) -> bool:
+        return name in list(iter(self))  # a mapping that is asked would make the array
+
     def __getitem__(self, name: str) -> NDArray[np.generic]:
         if name == "tissue" and self._tissue_image is not None:
             return self._tissues(self._tissue_image)

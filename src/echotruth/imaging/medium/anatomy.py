@@ -129,13 +129,14 @@ class Anatomy:
         points = sampled(self._nodes, self._facets)
         shared = cKDTree(points).query_pairs(1e-6 * self.radius, output_type="ndarray")
         number = np.setdiff1d(np.arange(len(points)), shared[:, 1])
-        return cKDTree(points[number]), number
+        # Positions far from the epicardium are near to many samples alike: large leaves are fast for them.
+        return cKDTree(points[number], leafsize=64, compact_nodes=False, balanced_tree=False), number
 
     def place(self, position: Floats) -> Place:
         """Place of positions (n, 3), m, in the heart frame."""
         samples, number = self._epicardium
         facet, point = np.divmod(number[samples.query(position)[1]], len(_lattice()))
-        nearest = closest(self._nodes[self._facets[facet]], _lattice()[point], position)
+        nearest = closest(self._nodes[self._facets], facet, _lattice()[point], position)
         distance = np.linalg.norm(position - nearest, axis=1)
         apex = samples.data[:, 2].min()
         azimuth = np.arctan2(*(nearest - self.base)[:, 1::-1].T) / SEPTUM_HALF_ANGLE
@@ -225,40 +226,57 @@ def sampled(nodes: Floats, facets: NDArray[np.int32]) -> Floats:
     return np.einsum("qa,fai->fqi", shape(_lattice()), nodes[facets]).reshape(-1, 3)
 
 
-def closest(facet: Floats, xi: Floats, position: Floats) -> Floats:
-    """Points (n, 3), m, of quadratic triangles (n, 6, 3), m, closest to positions (n, 3), m, by Newton's method.
+def closest(facets: Floats, number: NDArray[np.int64], xi: Floats, position: Floats) -> Floats:
+    """Points (n, 3), m, of quadratic triangles closest to positions (n, 3), m, by Newton's method.
 
     It begins at local coordinates (n, 2) and goes at most a step of the lattice, also beyond the sides of the triangle,
     where its neighbour continues it smoothly. Where there is no minimum nearby, the point is that of the beginning.
+
+    Parameters
+    ----------
+    facets : ndarray of shape (n_facets, 6, 3), m
+    number : ndarray of shape (n,)
+        Of the triangle for each position.
+    xi, position : ndarray of shape (n, 2), and (n, 3), m
     """
-    start = _at(facet, xi)
-    curvature = _curvature(facet)
-    now = xi
+    # Points are the last axis, in which NumPy is fast.
+    corner, slope, curvature = (np.take(np.moveaxis(part, 0, -1), number, axis=-1) for part in _expansion(facets))
+    now = start = xi.T
     for _ in range(NEWTON_STEPS):
-        offset = position - _at(facet, now)
-        tangent = np.einsum("nak,nai->nki", shape_gradient(now), facet)
-        hessian = tangent @ tangent.swapaxes(1, 2) - np.einsum("nkli,ni->nkl", curvature, offset)
-        slope = np.einsum("nki,ni->nk", tangent, offset)
-        (a, b), (_, d) = np.moveaxis(hessian, 0, -1)
+        point, tangent = _at(corner, slope, curvature, now)
+        offset = position.T - point
+        a, b, d = (_dot(tangent[k], tangent[m]) - _dot(curvature[k, m], offset) for k, m in ((0, 0), (0, 1), (1, 1)))
+        along, across = _dot(tangent[0], offset), _dot(tangent[1], offset)
         determinant = np.where(np.abs(a * d - b * b) > 0, a * d - b * b, 1)
-        step = np.stack([d * slope[:, 0] - b * slope[:, 1], a * slope[:, 1] - b * slope[:, 0]], axis=1)
-        now = xi + np.clip(now + step / determinant[:, None] - xi, -1 / SUBDIVISIONS, 1 / SUBDIVISIONS)
-    found = _at(facet, now)
-    nearer = np.linalg.norm(position - found, axis=1) < np.linalg.norm(position - start, axis=1)
-    return np.where(nearer[:, None], found, start)
+        step = np.stack([d * along - b * across, a * across - b * along]) / determinant
+        now = start + np.clip(now + step - start, -1 / SUBDIVISIONS, 1 / SUBDIVISIONS)
+    first, found = (_at(corner, slope, curvature, at)[0].T for at in (start, now))
+    nearer = np.linalg.norm(position - found, axis=1) < np.linalg.norm(position - first, axis=1)
+    return np.where(nearer[:, None], found, first)
 
 
-def _at(facet: Floats, xi: Floats) -> Floats:
-    """Points (n, 3), m, of quadratic triangles (n, 6, 3), m, at local coordinates (n, 2)."""
-    return np.einsum("na,nai->ni", shape(xi), facet)
+def _expansion(facets: Floats) -> tuple[Floats, Floats, Floats]:
+    """First corners (n, 3), first derivatives there (n, 2, 3), and second ones (n, 2, 2, 3), of triangles (n, 6, 3), m.
 
-
-def _curvature(facet: Floats) -> Floats:
-    """Second derivatives (n, 2, 2, 3), m, of quadratic triangles (n, 6, 3), m, which are constant."""
+    The second derivatives are constant.
+    """
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    at_corners = shape_gradient(corners)
-    second = np.stack([at_corners[1] - at_corners[0], at_corners[2] - at_corners[0]])
-    return np.einsum("lak,nai->nkli", second, facet)
+    first, *others = np.einsum("qak,nai->qnki", shape_gradient(corners), facets)
+    return facets[:, 0], first, np.stack(others, axis=1) - first[:, None]
+
+
+def _at(corner: Floats, slope: Floats, curvature: Floats, xi: Floats) -> tuple[Floats, Floats]:
+    """Points (3, n), m, at local coordinates (2, n) of triangles with given expansions, and derivatives (2, 3, n).
+
+    A point is the corner plus the way to it along the mean of the derivatives at both, as they change linearly.
+    """
+    tangent = slope + curvature[0] * xi[0] + curvature[1] * xi[1]
+    return corner + (slope[0] + tangent[0]) / 2 * xi[0] + (slope[1] + tangent[1]) / 2 * xi[1], tangent
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    """Scalar products (n,) of vectors (3, n)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def rim(nodes: Floats, facets: NDArray[np.int32]) -> tuple[Floats, float]:
