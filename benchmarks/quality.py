@@ -23,6 +23,7 @@ from suite.scores import heart_views, view_clips
 from threadpoolctl import threadpool_limits
 
 from benchmarks.parallel import in_processes
+from echotruth.config.tracking import OUTSIDE
 from echotruth.evaluation.clip import Clip
 from echotruth.tracking import quality
 from echotruth.tracking.speckle import speckle_length
@@ -64,7 +65,8 @@ def samples(row: Mapping[str, object]) -> list[Sample]:
             truth, _, clips = view_clips(one.case, heart, view)
             for clip in clips:
                 true, sort = truth.displacement / clip.spacing, (str(row["species"]), view, clip.size)
-                for settings in config.tracking.trackers.values():
+                ours = [each for each in config.tracking.trackers.values() if not isinstance(each, OUTSIDE)]
+                for settings in ours:
                     for noisy, values in _told(clip, true, settings, CENTRE_DEG[config.views[view].plane]):
                         found.append(Sample(quality.error_name(settings), (*sort, noisy), *values))
     return [one for one in found if len(one.near)]

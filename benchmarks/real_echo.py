@@ -32,7 +32,7 @@ import echotruth as et
 TRACKERS: dict[str, tuple[str, dict[str, Any]]] = {
     "bspline_dic": ("bspline_dic", {}),
     "bspline_dic, grey values": ("bspline_dic", {"dynamic_range_dB": 0.0}),
-    "affine_dic": ("affine_dic", {}),
+    "affine_dic": ("examples.affine_dic:track", {}),
     "dis": ("dis", {}),
     "dis_fine": ("dis", {"preset": "fine"}),
 }

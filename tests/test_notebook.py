@@ -289,8 +289,8 @@ def test_repeated_frame_and_lengths_for_another_heart_are_told(clip):
     image[1] = image[0]
     with pytest.warns(UserWarning, match="1 of 3 frames show the same image as the one before"):
         et.track(clip.assign(image=image), "dis")
-    with pytest.warns(UserWarning, match="subset_mm = 0.1 suits a wall 0.085 mm thick, and this one has"):
-        et.track(clip, "affine_dic", subset_mm=0.1)
+    with pytest.warns(UserWarning, match="knots_mm = 0.04 suits a wall 0.085 mm thick, and this one has"):
+        et.track(clip, "bspline_dic", knots_mm=0.04)
 
 
 @pytest.mark.parametrize(
@@ -363,7 +363,8 @@ def test_lines_are_kept_where_asked(heart, clip):
 
 
 def test_tracker_of_the_configuration_goes_by_its_name(clip):
-    named, method = et.track(clip, "as_published", window_px=16), et.track(clip, "phase_correlation", window_px=16)
+    settings = et.Config().tracking.trackers["corrected"].model_dump(exclude={"method"}) | {"window_mm": 2.0}
+    named, method = et.track(clip, "corrected", window_mm=2.0), et.track(clip, "phase_correlation", **settings)
     np.testing.assert_array_equal(named["displacement"], method["displacement"])
 
 

@@ -1,12 +1,13 @@
-"""Loops that threads share."""
+"""Work that threads share."""
 
 import multiprocessing
+import threading
 
 import numba
 import numpy as np
 import pytest
 
-from echotruth.threads import share
+from echotruth.threads import each, share
 
 
 @numba.njit(nogil=True)
@@ -32,6 +33,19 @@ def threads(request):
 @pytest.mark.parametrize("length", [0, 1, 2, 7, 1000])
 def test_every_turn_is_carried_out_once(threads, length):
     assert (counted(length) == 1).all()
+
+
+def test_results_come_in_the_order_of_the_items_from_as_many_threads_as_numba_uses(threads):
+    allowed, together = numba.get_num_threads(), threading.Barrier(numba.get_num_threads())
+
+    def result(item):
+        together.wait(timeout=60)  # for as many others as may run at a time
+        return item, threading.get_ident()
+
+    items, idents = zip(*each(result, range(2 * allowed)), strict=True)
+    assert items == tuple(range(2 * allowed))
+    assert len(set(idents)) == allowed
+    assert (threading.get_ident() in idents) == (allowed == 1)
 
 
 def test_error_in_a_thread_is_raised():

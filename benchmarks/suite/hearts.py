@@ -66,7 +66,7 @@ TRACKERS: dict[str, dict[str, Any]] = {
         "reference": "bidirectional",
     },
     "window_deformation": {"method": "window_deformation"},
-    "affine_dic": {"method": "affine_dic"},
+    "affine_dic": {"method": "external", "track": "examples.affine_dic:track"},
     "dis": {"method": "dis"},
     "dis_fine": {"method": "dis", "preset": "fine"},
     "bspline_dic": {"method": "bspline_dic"},
@@ -74,6 +74,8 @@ TRACKERS: dict[str, dict[str, Any]] = {
 }
 WINDOW_MM = 1.5
 """Window of `corrected` in a mouse."""
+SUBSET_MM = 1.0
+"""Subset of `affine_dic` in a mouse."""
 
 FILES = (
     *(Path(__file__).parent / f"{name}.py" for name in ("hearts", "scores", "columns")),
@@ -207,7 +209,8 @@ def _condition(species: str, condition: str, random: Random) -> Keys:
 def _configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None) -> et.Config:
     if trackers is None:
         corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
-        trackers = TRACKERS | {"corrected": corrected}
+        affine = TRACKERS["affine_dic"] | {"options": _scaled(species, {"subset_mm": SUBSET_MM})}
+        trackers = TRACKERS | {"corrected": corrected, "affine_dic": affine}
     settings = SETTINGS | {"tracking": {"grid": 0.016, "trackers": trackers}}
     return et.configure(merged(settings, nested({"geometry.preset": species} | keys), whole=()))
 

@@ -1,16 +1,20 @@
-"""Loops that threads share.
+"""Work that threads share: as many as numba uses, one in a job of one core.
 
 Compiled loops let go of Python's lock, so that threads of Python run them side by side. Numba's own parallel loops take
 two to three times as long to compile.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from itertools import pairwise
+from typing import TypeVar
 
 from numba import get_num_threads
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 
 
 def share(loop: Callable[[tuple[int, int]], object], count: int) -> None:
@@ -24,13 +28,24 @@ def share(loop: Callable[[tuple[int, int]], object], count: int) -> None:
     count : int
         Number of turns.
     """
-    threads = get_num_threads()
-    parts = min(threads, count)
-    if parts < 2:
-        loop((0, count))
-        return
+    parts = max(1, min(get_num_threads(), count))
     bounds = [count * part // parts for part in range(parts + 1)]
-    list(_pool(threads).map(loop, pairwise(bounds)))
+    each(loop, list(pairwise(bounds)))
+
+
+def each(function: Callable[[Item], Found], items: Sequence[Item]) -> list[Found]:
+    """Results of a function for each of some items, in their order, from as many threads as numba uses.
+
+    Parameters
+    ----------
+    function : callable
+        Does not share work itself: it would wait for the threads that wait for it.
+    items : sequence
+    """
+    threads = get_num_threads()
+    if min(threads, len(items)) < 2:
+        return [function(item) for item in items]
+    return list(_pool(threads).map(function, items))
 
 
 @lru_cache(maxsize=1)

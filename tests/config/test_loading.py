@@ -40,7 +40,7 @@ BAD = {
     "tracking: {trackers: {both: {window_mm: 1.0}}}": "give either window_px or window_mm",
     "tracking: {trackers: {dis: {method: dis, presett: fast}}}": "tracking.trackers.dis.presett is not a key of the "
     "method dis (others: phase_correlation, ",
-    "tracking: {trackers: {one: {method: affine_dic, subset_mm: 1000}}}": "subset_mm = 1000.0: must not exceed bmode",
+    "tracking: {trackers: {one: {method: bspline_dic, knots_mm: 1000}}}": "knots_mm = 1000.0: must not exceed bmode",
     "tracking: {grid_px: 5}": "tracking.grid_px is not a key: write tracking.grid, over the side of the image: 0.01",
     "tracking: {grid: 5}": "tracking.grid = 5: should be less than or equal to 0.25",
     "views: {c: {}}": "views = 'c': is the name of a file or folder of Zarr: choose another",

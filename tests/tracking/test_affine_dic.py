@@ -1,11 +1,14 @@
+"""The example of an affine correlation of subsets, which the benchmark has."""
+
 import numba
 import numpy as np
 import pytest
 from scipy import ndimage
 
-from echotruth.config.tracking import AffineDic
+from echotruth.config.tracking import External
 from echotruth.imaging import spline
-from echotruth.tracking import subset, track
+from echotruth.tracking import track
+from examples import affine_dic
 
 SPACING = 3e-5
 SIZE = 160
@@ -17,9 +20,9 @@ def texture(random=0):
     return spline.coefficients(ndimage.gaussian_filter(noise, 2.5, mode="mirror").astype(np.float32))
 
 
-def tracked(frames, points, **settings):
-    mask = np.ones(frames.shape[1:], bool)
-    return track(frames, points, mask, SPACING, np.arange(len(frames)) * 3e-3, 0, AffineDic(**settings))
+def tracked(frames, points, **options):
+    mask, settings = np.ones(frames.shape[1:], bool), External(track="examples.affine_dic:track", options=options)
+    return track(frames, points, mask, SPACING, np.arange(len(frames)) * 3e-3, 0, settings)
 
 
 @pytest.fixture
@@ -30,7 +33,7 @@ def inner():
 
 def aligned(first, second, points, start, half=12, min_std=1e-3):
     warps, ncc = np.array(start, float), np.zeros(len(points))
-    subset.align(first, second, points, half, min_std, warps, ncc)
+    affine_dic.align(first, second, points, half, min_std, warps, ncc)
     return warps, ncc
 
 
@@ -53,8 +56,8 @@ def test_affine_motion_is_found_to_the_thousandth_of_a_pixel(inner):
 
 def test_factor_of_a_singular_hessian_is_zero():
     gradient = np.random.default_rng(1).normal(size=(7, 7)).astype(np.float32)
-    matrix = subset.hessian(gradient, 2 * gradient)
-    subset.cholesky(matrix)
+    matrix = affine_dic.hessian(gradient, 2 * gradient)
+    affine_dic.cholesky(matrix)
     assert (matrix == 0).all()
 
 

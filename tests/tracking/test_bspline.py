@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from scipy import interpolate, ndimage
+from scipy import interpolate, ndimage, stats
 
 from echotruth.imaging import spline
 from echotruth.tracking import alignment, bending_energy
@@ -51,6 +51,27 @@ def test_field_is_the_tensor_product_spline_of_scipy(random):
     np.testing.assert_allclose(lattice.evaluate(coefficients, points)[:, 0], expected, atol=1e-12)
 
 
+def test_adjoint_is_the_transpose_of_the_evaluation(random):
+    # Points of no order, and pixels, which lie on lines.
+    for points in (random.uniform([15, 12], [69, 44], (50, 2)), np.argwhere(MASK)[:, ::-1].astype(float)):
+        lattice = lattice_around(np.argwhere(MASK)[:, ::-1], STEP)
+        cells, _ = lattice.sort_points(points)
+        coefficients, values = random.normal(size=(lattice.size, 3)), random.normal(size=(len(points), 3))
+        product = np.vdot(cells.evaluate(coefficients), values)
+        assert np.vdot(coefficients, cells.adjoint(values, lattice.size)) == pytest.approx(product, rel=1e-12)
+
+
+def test_robust_weight_is_a_quarter_at_the_tolerance_and_only_seen_pixels_tell_the_scale():
+    residual = stats.norm.ppf((np.arange(40_000) + 0.5) / 40_000)
+    seen = np.ones_like(residual)
+    residual[0] = 3.0
+    assert alignment.geman_mcclure(residual, 3.0, seen)[0] == pytest.approx(0.25, rel=1e-3)
+    seen[1::2], residual[1::2] = 0.0, 100.0
+    weight = alignment.geman_mcclure(residual, 3.0, seen)
+    assert weight[0] == pytest.approx(0.25, rel=1e-3) and (weight[1::2] == 0).all()
+    assert (alignment.geman_mcclure(residual, 3.0, 0 * seen) == 0).all()
+
+
 def jacobian(region, gradient):
     """Derivative of the grey value of every pixel by every unknown, shape (pixel, unknowns)."""
     weights = region.cells.evaluate(np.eye(region.lattice.size))
@@ -91,9 +112,7 @@ def test_normal_equations_are_those_of_the_dense_problem(random, stride):
     count = len(region.positions)
     gradient, weight = random.normal(size=(count, 2)), random.uniform(size=count)
     band, cells = np.zeros(region.energy.band.shape), region.cells
-    alignment.add_normal_matrix(
-        cells.knots, cells.offsets, cells.weight_x, cells.weight_y, gradient, weight, stride, band
-    )
+    alignment.add_normal_matrix(cells.lines, gradient, weight, stride, band)
     # Every stride-th pixel of a cell counts stride times.
     index = np.arange(count) - np.repeat(cells.offsets[:-1], np.diff(cells.offsets))
     design, counted = jacobian(region, gradient), stride * weight * (index % stride == 0)
@@ -125,7 +144,7 @@ def test_fit_of_a_flow_becomes_that_by_least_squares_with_its_own_weights(random
     flow[::7] += 5
     found = region.fit(flow)
     residual = region.cells.evaluate(found) - flow
-    weight = region_module.geman_mcclure(np.hypot(*residual.T), 2)
+    weight = alignment.geman_mcclure(np.hypot(*residual.T), 2.0, np.ones(len(flow)))
     component = np.arange(len(flow)) % 2
     design = jacobian(region, np.eye(2)[component])
     gradient = design.T @ (weight / weight.mean() * residual[np.arange(len(flow)), component])

@@ -20,7 +20,7 @@ def test_effective_parameters_are_those_of_independent_unknowns(random):
     image, energy = random.uniform(0.1, 10, 40), random.uniform(0.1, 10, 40)
     energy[:6] = 0
     probes = random.choice([-1.0, 1.0], size=(2, 40))
-    found = effective_parameters(3.0, lambda rhs: rhs / (image + 3 * energy), probes, probes * energy)
+    found = effective_parameters(3.0, lambda rhs: rhs / (image + 3 * energy)[:, None], probes, probes * energy)
     assert found == pytest.approx((image / (image + 3 * energy))[6:].sum())
 
 
@@ -34,7 +34,7 @@ def test_weight_settles_where_the_evidence_is_greatest(random, monkeypatch):
     for _ in range(200):
         fitted = image * data / (image + beta * energy)
         effective = effective_parameters(
-            beta, lambda rhs, beta=beta: rhs / (image + beta * energy), probes, probes * energy
+            beta, lambda rhs, beta=beta: rhs / (image + beta * energy)[:, None], probes, probes * energy
         )
         beta = energy_weight(variance, effective, float(fitted @ (energy * fitted)), 1.0)
     grid = np.geomspace(0.5, 50, 2001)

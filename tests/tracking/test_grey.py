@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from echotruth.config.tracking import AffineDic, PhaseCorrelation, WindowDeformation
+from echotruth.config.tracking import PhaseCorrelation, WindowDeformation
 from echotruth.tracking import track
 from echotruth.tracking.grey import MIN_GAIN_DB, MIN_STD, decompress, even_gain, grey_levels, local_ncc, rms
 
@@ -63,7 +63,7 @@ def test_even_gain_removes_a_shadow_and_leaves_black_black():
     np.testing.assert_array_equal(even_gain(speckle, 15.0, 0.0), speckle)
 
 
-@pytest.mark.parametrize("section", [PhaseCorrelation, WindowDeformation, AffineDic])
+@pytest.mark.parametrize("section", [PhaseCorrelation, WindowDeformation])
 def test_tracker_with_a_dynamic_range_follows_the_amplitudes(clip, section):
     """As if it were given a clip of the amplitudes, in any unit; the grey values give another track."""
     frames, along = clip(lambda place, t: place + t * np.array([1.3, -0.6]), 2), np.arange(40, 121, 20.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from echotruth.config.tracking import AffineDic, BsplineDic, Dis, WindowDeformation
+from echotruth.config.tracking import BsplineDic, Dis, WindowDeformation
 from echotruth.tracking.plausibility import doubts, repeated, wall_thickness
 
 FRAMES, SIZE = 8, 64
@@ -28,7 +28,7 @@ def told(frames, mask, settings=None, spacing=0.85e-3 / 20):
 
 
 def test_clip_without_repetition_in_a_wall_that_the_lengths_suit_is_not_doubted(frames, mask):
-    for settings in (BsplineDic(), AffineDic(), WindowDeformation(), Dis()):
+    for settings in (BsplineDic(), WindowDeformation(), Dis()):
         assert told(frames, mask, settings) == []
 
 
@@ -57,7 +57,6 @@ def test_what_changes_beside_the_wall_makes_no_frame_another(frames, mask):
     ("settings", "sentence"),
     [
         (BsplineDic(), "knots_mm = 0.4 suits a wall 0.85 mm thick, and this one has 8.5 mm: give about 4"),
-        (AffineDic(), "subset_mm = 1 suits a wall 0.85 mm thick, and this one has 8.5 mm: give about 10"),
         (WindowDeformation(), "windows_mm = 0.75 suits a wall 0.85 mm thick, and this one has 8.5 mm: give about 7.5"),
     ],
 )

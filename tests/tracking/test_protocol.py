@@ -1,5 +1,9 @@
 """Requirements of every tracker that knows nothing of hearts."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -152,3 +156,29 @@ def test_same_input_gives_the_same_bytes_and_is_not_changed(clips, tracker):
     places.setflags(write=False)
     results = [b"".join(array.tobytes() for array in found(clips["steps"], tracker, places)) for _ in range(2)]
     assert results[0] == results[1]
+
+
+LOOK = """
+import numpy as np
+from threadpoolctl import threadpool_info
+from echotruth.config.tracking import BsplineDic
+from echotruth.tracking import tracker
+
+def look(clip, settings):
+    print(*(library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"))
+    raise ValueError
+
+tracker.tracked_path = look
+frames, mask = np.zeros((2, 64, 64)), np.ones((64, 64), bool)
+try:
+    tracker.track(frames, np.zeros((1, 2)), mask, 3e-5, np.arange(2.0), 0, BsplineDic())
+except tracker.TrackerFailed:
+    pass
+"""
+
+
+def test_blas_of_numpy_and_scipy_runs_on_one_thread_while_a_method_tracks():
+    """In a process of its own, as SciPy's is loaded only by the method."""
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "2"}
+    run = subprocess.run([sys.executable, "-c", LOOK], env=environment, check=True, stdout=subprocess.PIPE, text=True)
+    assert len(run.stdout.split()) >= 2 and set(run.stdout.split()) == {"1"}

@@ -2,6 +2,8 @@
 
 import errno
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -138,3 +140,24 @@ def test_job_writes_the_groups_of_all_sizes_or_that_of_its_tracker():
         "mechanics": ["heart"],
         "inference": ["inference"],
     }
+
+
+LATER = """
+import sys
+from echotruth.workflow.job import main
+
+assert "numba" not in sys.modules
+sys.argv = ["tracking.py", "none", "heart", "mid", "bspline_dic"]
+try:
+    main("tracking", None, "")
+except SystemExit:
+    import numba
+    print(numba.get_num_threads())
+"""
+
+
+def test_a_tracker_that_is_imported_later_has_the_threads_of_its_job(tmp_path):
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_NUM_THREADS"}
+    command = [sys.executable, "-c", LATER]
+    run = subprocess.run(command, cwd=tmp_path, env=environment, check=True, stdout=subprocess.PIPE, text=True)
+    assert run.stdout.split() == ["1"]

@@ -15,8 +15,8 @@ from echotruth.echo.wall_file import default_output, said
 VIEWS = "basal, mid or apical; four_chamber, two_chamber or three_chamber; short_axis or long_axis without segments"
 
 TRACKERS = (
-    *("as_published", "corrected", "phase_correlation"),
-    *("window_deformation", "affine_dic", "bspline_dic", "bspline_cnn", "dis"),
+    *("corrected", "phase_correlation", "window_deformation"),
+    *("bspline_dic", "bspline_cnn", "dis"),
 )
 """Trackers of a default configuration and methods, which the help names without importing them."""
 

@@ -45,7 +45,7 @@ ARRAY_SUFFIXES = (".npy", ".npz")
 
 REFERENCE_FIELD_OF_VIEW_MM = 12.0
 """Field of view for which the sections of the trackers give their default lengths."""
-TRACKER_LENGTHS = ("windows_mm", "subset_mm", "knots_mm", "margin_um", "gain_mm", "speckle_pixel_um")
+TRACKER_LENGTHS = ("windows_mm", "knots_mm", "margin_um", "gain_mm", "speckle_pixel_um")
 """Keys of trackers that scale with `bmode.field_of_view_mm`, because larger hearts have thicker walls."""
 
 

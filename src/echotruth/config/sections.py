@@ -22,7 +22,7 @@ from echotruth.config.realism import Neighbours, Realism
 from echotruth.config.tracking import PhaseCorrelation, Tracking
 from echotruth.section import OF_ZARR, Section, check, invalid, value_of
 
-_TRACKER_LENGTHS = ("window_mm", "windows_mm", "subset_mm", "knots_mm")
+_TRACKER_LENGTHS = ("window_mm", "windows_mm", "knots_mm")
 """Keys of trackers that must not exceed the image."""
 
 

@@ -71,17 +71,6 @@ class WindowDeformation(Section):
     reference: Reference = "bidirectional"
 
 
-class AffineDic(Section):
-    """Affine digital image correlation of one subset about every point, by inverse compositional Gauss-Newton."""
-
-    method: Literal["affine_dic"] = "affine_dic"
-    """Name of the method."""
-    subset_mm: Positive = 1.0
-    """Side of a subset; 17 pixels at least. Default: as suits `bmode.field_of_view_mm`."""
-    dynamic_range_dB: DynamicRange = 0.0
-    reference: Reference = "bidirectional"
-
-
 class BsplineDic(Section):
     """Digital image correlation of the whole wall at once; the motion is a cubic B-spline."""
 
@@ -278,7 +267,6 @@ OUTSIDE = (External, Onnx)
 METHODS: tuple[type[Section], ...] = (
     PhaseCorrelation,
     WindowDeformation,
-    AffineDic,
     BsplineDic,
     BsplineCnn,
     Dis,
@@ -309,7 +297,7 @@ else:
 
 
 def default_trackers(scale: float = 1.0) -> dict[str, Any]:
-    """The default trackers: the paper's as published and as corrected, stronger ones, and one of a library.
+    """The default trackers: the paper's as corrected, stronger ones, and one of a library.
 
     Parameters
     ----------
@@ -318,10 +306,8 @@ def default_trackers(scale: float = 1.0) -> dict[str, Any]:
     """
     window: dict[str, Any] = {"window_px": None, "window_mm": 1.5 * scale}
     return {
-        "as_published": PhaseCorrelation(),
         "corrected": PhaseCorrelation(**window, taper="hann", spectral_threshold=0.01, reference="bidirectional"),
         "window_deformation": WindowDeformation(),
-        "affine_dic": AffineDic(),
         "dis": Dis(),
         "bspline_dic": BsplineDic(),
     }
@@ -341,8 +327,8 @@ class Tracking(Section):
     trackers: Annotated[dict[Name, Tracker], Field(min_length=1, max_length=64)] = Field(
         default_factory=default_trackers
     )
-    """Settings by name: `as_published` is the tracker as the paper prints it; `corrected` has tapered windows with the
-    same size in tissue for every image size, leaves out frequencies without speckle, and is bidirectional."""
+    """Settings by name: `corrected` is the tracker of the paper with tapered windows of the same size in tissue for
+    every image size, without the frequencies that have no speckle, and bidirectional."""
 
     @check
     def _check_names(self) -> None:

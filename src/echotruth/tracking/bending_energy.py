@@ -59,8 +59,7 @@ class BendingEnergy:
 
     @classmethod
     def _projected(cls, band: np.ndarray, free: np.ndarray, gradients: np.ndarray) -> BendingEnergy:
-        # NumPy's own sum, which takes one order whatever the number of threads.
-        products = np.einsum("ua,ub->ab", free, gradients)
+        products = free.T @ gradients
         return cls(band, free, gradients, gradients @ np.linalg.pinv(products, MIN_ENERGY, hermitian=True))
 
     def and_without(self, field: np.ndarray) -> BendingEnergy:
@@ -74,8 +73,7 @@ class BendingEnergy:
 
     def gradient(self, field: np.ndarray) -> np.ndarray:
         """Half the gradient of the energy of a field, both of shape (unknowns,)."""
-        products = np.sum(self.gradients * field[:, None], 0)
-        return _product(self.band, field) - np.sum(self.projection * products, 1)
+        return _product(self.band, field) - self.projection @ (self.gradients.T @ field)
 
 
 def _product(band: np.ndarray, field: np.ndarray) -> np.ndarray:

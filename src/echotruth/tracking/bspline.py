@@ -5,16 +5,23 @@ depends on the 4 x 4 knots around it. One thread takes all sums in one order, so
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numba
 import numpy as np
 
 from echotruth.tracking import cubic
 
+Lines = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Arrays of :attr:`Cells.lines`."""
+
 
 @dataclass(frozen=True)
 class Cells:
-    """Points sorted by the cell of the lattice that contains them.
+    """Points sorted by the cell of the lattice that contains them, and in a cell by line.
+
+    A line are points of a cell that follow one another at the same axial place, as pixels do. They share the basis
+    functions of the rows of knots, so that sums are taken along each line first, and then over the lines.
 
     Attributes
     ----------
@@ -24,26 +31,41 @@ class Cells:
         First point of each cell; the last entry is the number of points.
     fraction : ndarray of shape (point, 2)
         Position within the cell, lateral and axial, 0 to 1.
-    weight_x, weight_y : ndarray of shape (point, 4), float64
-        Basis functions of the four columns and rows of knots at each point.
     """
 
     knots: np.ndarray
     offsets: np.ndarray
     fraction: np.ndarray
-    weight_x: np.ndarray
-    weight_y: np.ndarray
+
+    @cached_property
+    def lines(self) -> Lines:
+        """What compiled sums need: `knots`, and
+
+        - the first line of each cell, (cell + 1,), and the first point of each line, (line + 1,); the last entries are
+          the numbers of lines and of points;
+        - basis functions of the four columns of knots at each point, (point, 4), and of the four rows at each line,
+          (line, 4).
+        """
+        axial = self.fraction[:, 1]
+        begins = np.ones(len(axial), bool)
+        begins[1:] = axial[1:] != axial[:-1]
+        begins[self.offsets[:-1]] = True
+        first_point = np.append(np.flatnonzero(begins), len(axial))
+        weight_x, weight_y = (
+            np.stack(cubic.bspline_weights(u), -1) for u in (self.fraction[:, 0], axial[first_point[:-1]])
+        )
+        return self.knots, np.searchsorted(first_point, self.offsets), first_point, weight_x, weight_y
 
     def evaluate(self, coefficients: np.ndarray) -> np.ndarray:
         """Values (point, field) of fields with coefficients (knot, field); all knots must be in use."""
-        values = np.empty((len(self.weight_x), coefficients.shape[1]))
-        _evaluate(self.knots, self.offsets, self.weight_x, self.weight_y, np.ascontiguousarray(coefficients), values)
+        values = np.empty((len(self.fraction), coefficients.shape[1]))
+        _evaluate(self.lines, np.ascontiguousarray(coefficients), values)
         return values
 
     def adjoint(self, values: np.ndarray, size: int) -> np.ndarray:
         """Transpose of :meth:`evaluate`: sums (knot, field) of values (point, field) times basis functions."""
         sums = np.zeros((size, values.shape[1]))
-        _adjoint(self.knots, self.offsets, self.weight_x, self.weight_y, np.ascontiguousarray(values), sums)
+        _adjoint(self.lines, np.ascontiguousarray(values), sums)
         return sums
 
 
@@ -98,8 +120,7 @@ class KnotLattice:
         around = np.arange(-1, 3)
         knots = self.index[row[:, None, None] + around[:, None], column[:, None, None] + around]
         fraction = ((points - self.origin) / self.knot_spacing - column_row)[order]
-        weight_x, weight_y = (np.stack(cubic.bspline_weights(u), -1) for u in fraction.T)
-        return Cells(knots.reshape(-1, 16), np.append(offsets, len(points)), fraction, weight_x, weight_y), order
+        return Cells(knots.reshape(-1, 16), np.append(offsets, len(points)), fraction), order
 
     def affine_fields(self) -> np.ndarray:
         """Coefficients (2 size, 6) of six fields that span the affine ones: 1, x and y in either component.
@@ -169,32 +190,50 @@ def lattice_around(positions: np.ndarray, knot_spacing: float) -> KnotLattice:
 
 
 @numba.njit(cache=True, nogil=True)
-def _evaluate(knots, offsets, weight_x, weight_y, coefficients, values):
+def _evaluate(lines, coefficients, values):
+    knots, first_line, first_point, weight_x, weight_y = lines
     local = np.empty((4, 4))
     for cell in range(len(knots)):
         for field in range(values.shape[1]):
             for k in range(16):
                 local[k // 4, k % 4] = coefficients[knots[cell, k], field]
-            for point in range(offsets[cell], offsets[cell + 1]):
-                total = 0.0
-                for i in range(4):
-                    row = 0.0
-                    for j in range(4):
-                        row += weight_x[point, j] * local[i, j]
-                    total += weight_y[point, i] * row
-                values[point, field] = total
+            for line in range(first_line[cell], first_line[cell + 1]):
+                # Four numbers and not an array, so that they are not fetched for each point.
+                a, b, c, d = _columns(weight_y[line], local)
+                for point in range(first_point[line], first_point[line + 1]):
+                    p, q, r, s = weight_x[point]
+                    values[point, field] = (a * p + b * q) + (c * r + d * s)
 
 
 @numba.njit(cache=True, nogil=True)
-def _adjoint(knots, offsets, weight_x, weight_y, values, sums):
+def _columns(weights, local):
+    """Sum of the rows of coefficients (4, 4) times their weights (4,)."""
+    p, q, r, s = weights
+    return (
+        (p * local[0, 0] + q * local[1, 0]) + (r * local[2, 0] + s * local[3, 0]),
+        (p * local[0, 1] + q * local[1, 1]) + (r * local[2, 1] + s * local[3, 1]),
+        (p * local[0, 2] + q * local[1, 2]) + (r * local[2, 2] + s * local[3, 2]),
+        (p * local[0, 3] + q * local[1, 3]) + (r * local[2, 3] + s * local[3, 3]),
+    )
+
+
+@numba.njit(cache=True, nogil=True)
+def _adjoint(lines, values, sums):
+    knots, first_line, first_point, weight_x, weight_y = lines
     local = np.empty((4, 4))
     for cell in range(len(knots)):
         for field in range(values.shape[1]):
             local[:] = 0
-            for point in range(offsets[cell], offsets[cell + 1]):
+            for line in range(first_line[cell], first_line[cell + 1]):
+                a = b = c = d = 0.0
+                for point in range(first_point[line], first_point[line + 1]):
+                    (p, q, r, s), value = weight_x[point], values[point, field]
+                    a, b, c, d = a + p * value, b + q * value, c + r * value, d + s * value
                 for i in range(4):
-                    row = weight_y[point, i] * values[point, field]
-                    for j in range(4):
-                        local[i, j] += row * weight_x[point, j]
+                    weight = weight_y[line, i]
+                    local[i, 0] += weight * a
+                    local[i, 1] += weight * b
+                    local[i, 2] += weight * c
+                    local[i, 3] += weight * d
             for k in range(16):
                 sums[knots[cell, k], field] += local[k // 4, k % 4]

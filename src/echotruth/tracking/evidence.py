@@ -94,7 +94,7 @@ def effective_parameters(
 
     The trace is the mean of z^T (N + beta K)^-1 K z over vectors z of random signs (Hutchinson 1990, Commun Stat Simul
     Comput 19:433, doi 10.1080/03610919008812866): `probes`, with the `products` K z, both (probe, unknowns). `solve`
-    multiplies (unknowns,) by (N + beta K)^-1.
+    multiplies (unknowns, probe) by (N + beta K)^-1.
     """
-    trace = np.mean([solve(probe) @ product for probe, product in zip(probes, products, strict=True)])
+    trace = np.vdot(solve(probes.T).T, products) / len(probes)
     return float(probes.shape[1] - AFFINE_UNKNOWNS - beta * trace)

@@ -7,7 +7,7 @@ import numpy as np
 
 REFERENCE_WALL_MM = 0.85
 """Thickness of the wall of the default mouse at end-diastole in a short axis, which the default lengths suit."""
-LENGTHS = ("knots_mm", "subset_mm", "windows_mm")
+LENGTHS = ("knots_mm", "windows_mm")
 """Settings that say how large a piece of tissue is followed; the last of several windows gives the result."""
 MISFIT = 2.5
 """Thickness of the wall over that which the lengths suit, or the inverse, above which there is a warning."""

@@ -119,7 +119,6 @@ ERRORS = {
     "phase_correlation_ED": ErrorModel(0.254, 2.65, 0.0, 0.0, 0.351, 0.0, 0.0),
     "phase_correlation": ErrorModel(0.0186, 50.0, 0.314, 0.314, 0.0463, 0.0, 0.0),
     "window_deformation": ErrorModel(0.236, 1.26, 0.204, 0.256, 0.0389, 0.0, 0.0),
-    "affine_dic": ErrorModel(1.19, 0.572, 0.22, 0.26, 0.0484, 0.0, 0.0),
     "dis": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
     "dis_fine": ErrorModel(0.335, 0.675, 0.207, 0.229, 0.0663, 0.0, 0.0),
     "bspline_dic": ErrorModel(0.172, 0.559, 0.259, 0.284, 0.0321, 0.196, 0.0),

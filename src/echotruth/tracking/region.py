@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy import linalg, ndimage
+from scipy.linalg import lapack
 
 from echotruth.tracking import alignment
 from echotruth.tracking.bending_energy import BendingEnergy, bending_matrix, wall_frame
@@ -32,10 +33,6 @@ EVIDENCE_ITERATIONS = (2, 4, 6)
 """Iterations at which the evidence sets the weight anew; convergence is looked for from the last one on."""
 PIXELS_PER_CELL = 40
 """Pixels of a cell that are enough for the normal matrix, which affects the rate of convergence, not the solution."""
-MEDIAN_STRIDE = 4
-"""Every n-th residual is used for their median."""
-MAD_TO_STD = 1.4826
-"""Standard deviation of a Gaussian over its median absolute deviation."""
 SINGULAR = 1e-9
 """Share of the greatest singular value below which one counts as 0."""
 REGULARISATION = 1e-5
@@ -61,19 +58,19 @@ class NormalMatrix:
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """F^-1 rhs; both of shape (unknowns,) or (unknowns, n)."""
-        return linalg.cho_solve_banded((self.factor, False), rhs, check_finite=False)
+        # SciPy's own function checks and converts for longer than a small system takes.
+        return lapack.dpbtrs(self.factor, rhs)[0]
 
     def newton_step(self, rhs: np.ndarray) -> np.ndarray:
         """S^-1 rhs, both of shape (unknowns,), by the Woodbury formula."""
         step, (response, inverse) = self.solve(rhs), self._free
-        products = np.sum(self.energy.gradients * step[:, None], 0)
-        return step + np.sum(response * np.sum(inverse * products, 1), 1)
+        return step + response @ (inverse @ (self.energy.gradients.T @ step))
 
     @cached_property
     def _free(self) -> tuple[np.ndarray, np.ndarray]:
         """R = beta F^-1 K A (A^T K A)^+, shape (unknowns, free), and (1 - (K A)^T R)^+, shape (free, free)."""
         response = self.energy_weight * self.solve(self.energy.projection)
-        product = np.sum(self.energy.gradients[:, :, None] * response[:, None], 0)
+        product = self.energy.gradients.T @ response
         return response, np.linalg.pinv(np.eye(len(product)) - product, SINGULAR)
 
 
@@ -144,23 +141,23 @@ class WallRegion:
         """
         coefficients, position = start, self.displaced(start)
         normal: NormalMatrix | None = None
+        shown = np.ones(len(template)) if seen is None else seen
         energy = self.energy.and_without(previous.ravel())
         for iteration in range(iterations):
             warped = alignment.interpolate_with_gradient(image, position)
-            residual = warped[:, 0] - template
-            match = Match(template, residual, warped[:, 1:], geman_mcclure(residual, tolerance, seen))
+            residual, weight, force = alignment.robust_match(warped, template, tolerance, shown)
+            match = Match(template, residual, warped[:, 1:], weight)
             if (
                 normal is None
                 or iteration % MATRIX_REUSE == 0
                 or (smoothness is None and iteration in EVIDENCE_ITERATIONS)
             ):
                 normal = self._normal_matrix(match, smoothness, energy, coefficients - previous, normal)
-            force = (match.weight * residual)[:, None] * match.gradient
             change = self._newton_step(normal, force, coefficients - previous)
             step = self.cells.evaluate(change)
             coefficients, position = coefficients + change, position + step
             settled = smoothness is not None or iteration >= EVIDENCE_ITERATIONS[-1]
-            if settled and np.sqrt(np.mean(step**2)) < CONVERGENCE * self.lattice.knot_spacing:
+            if settled and np.linalg.norm(step) < CONVERGENCE * self.lattice.knot_spacing * np.sqrt(step.size):
                 break
         return coefficients, alignment.interpolate_with_gradient(image, position)
 
@@ -177,7 +174,7 @@ class WallRegion:
         coefficients = np.zeros((self.lattice.size, 2))
         for _ in range(FLOW_ITERATIONS):
             residual = self.cells.evaluate(coefficients) - flow
-            weight = geman_mcclure(np.hypot(*residual.T), 2)
+            weight = alignment.geman_mcclure(np.hypot(*residual.T), 2.0, np.ones(len(flow)))
             force = (weight / weight.mean())[:, None] * residual * self._flow_component
             coefficients = coefficients + self._newton_step(self._flow_matrix, force, coefficients)
         return coefficients
@@ -238,17 +235,8 @@ class WallRegion:
 
     def _image_matrix(self, gradient: np.ndarray, weight: np.ndarray, stride: int) -> tuple[np.ndarray, float]:
         """Banded matrix N of every `stride`-th gradient (pixel, 2) and weight (pixel,), and its mean diagonal."""
-        band, cells = np.zeros(self.energy.band.shape), self.cells
-        alignment.add_normal_matrix(
-            cells.knots,
-            cells.offsets,
-            cells.weight_x,
-            cells.weight_y,
-            np.ascontiguousarray(gradient),
-            weight,
-            stride,
-            band,
-        )
+        band = np.zeros(self.energy.band.shape)
+        alignment.add_normal_matrix(self.cells.lines, np.ascontiguousarray(gradient), weight, stride, band)
         return band, band[:, -1].mean() or 1.0
 
 
@@ -256,18 +244,7 @@ def _factor(band: np.ndarray, scale: float, energy_weight: float, energy: Bendin
     """N + beta K, regularised, from N; in place."""
     band += energy_weight * energy.band
     band[:, -1] += scale * REGULARISATION
-    return NormalMatrix(linalg.cholesky_banded(band.T), energy_weight, energy)
-
-
-def geman_mcclure(residual: np.ndarray, tolerance: float, seen: np.ndarray | None = None) -> np.ndarray:
-    """Robust weights 1 / (1 + (r / (tolerance sigma))^2)^2 (Geman and McClure), sigma from the median of |r|.
-
-    Residuals of pixels that are not seen have no weight, and no part in the median; all of them are of shape (pixel,).
-    """
-    known = residual if seen is None else residual[seen > 0]
-    scale = tolerance * MAD_TO_STD * np.median(np.abs(known[::MEDIAN_STRIDE])) if known.size else 0.0
-    weight = 1 / (1 + (residual / (scale or 1.0)) ** 2) ** 2
-    return weight if seen is None else weight * seen
+    return NormalMatrix(linalg.cholesky_banded(band.T, overwrite_ab=True), energy_weight, energy)
 
 
 def wall_region(mask: np.ndarray, knot_spacing: float, margin: float, transmural_scale: float) -> WallRegion:

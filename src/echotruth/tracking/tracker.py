@@ -4,6 +4,7 @@ import logging
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from echotruth.config.tracking import OUTSIDE
 from echotruth.extras import explained
@@ -81,8 +82,11 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     with explained(f"the tracker {settings.method}"):
         from echotruth.tracking.speckle import speckle_length
 
-        path = tracked_path(clip, settings)
-        speckle = speckle_length(clip.frames[0], clip.mask)
+        trackers.function(settings.method)  # a limit holds for libraries that are loaded
+        # The rounding of BLAS sums depends on the number of threads, but results must not.
+        with threadpool_limits(1):
+            path = tracked_path(clip, settings)
+            speckle = speckle_length(clip.frames[0], clip.mask)
     return path.displacement, error_model(settings).probability(path, speckle, clip.shape)
 
 

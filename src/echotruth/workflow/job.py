@@ -7,6 +7,7 @@ function, and writes groups. A group is moved to its place when it is whole; a j
 import argparse
 import json
 import logging
+import os
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
@@ -234,7 +235,9 @@ def _prepare(threads: int, place: str) -> None:
 
         guard_cache()
         numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
-        logging.getLogger("numba").setLevel(logging.WARNING)
+    else:
+        os.environ["NUMBA_NUM_THREADS"] = str(threads)  # of a tracker, whose module is imported when it is called
+    logging.getLogger("numba").setLevel(logging.WARNING)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
 
 

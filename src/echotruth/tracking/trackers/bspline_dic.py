@@ -8,7 +8,7 @@ In every frame the displacement U since end-diastole, a cubic B-spline of coeffi
     B_k, c_k  cubic B-spline of a knot, and its coefficient (2,), px         bspline.KnotLattice, bspline.Cells
     I         image: amplitude of even gain, a little blurred, in grey values    track (grey.decompress, grey.even_gain)
     T_p       template: an earlier image at its own displaced positions          Template, WallTracker.track
-    rho       r^2 / (1 + (r / (tolerance sigma))^2), sigma from the median |r|   region.geman_mcclure: w = rho'(r) / 2 r
+    rho       r^2 / (1 + (r / (tolerance sigma))^2), sigma from the median |r|   alignment.geman_mcclure: w = rho' / 2 r
     U_before  displacement in the frame before, px                               WallTracker.track
     E         bending energy, px^2: of the field less the best affine field      bending_energy.bending_matrix,
               and multiple of U_before, which have none                          bending_energy.BendingEnergy
@@ -32,7 +32,6 @@ mean of the two with weights from their variances.
 """
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -42,6 +41,7 @@ import numpy as np
 
 from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
+from echotruth.threads import each
 from echotruth.tracking import bidirectional
 from echotruth.tracking.accumulation import Path, step_variance
 from echotruth.tracking.alignment import interpolate_with_gradient
@@ -142,22 +142,21 @@ def follow(clip: TrackerInput, settings: BsplineDic) -> "BothWays":
         even = even_gain(amplitude, settings.gain_mm * mm / spacing, typical) if settings.gain_mm else amplitude
         return block_mean(even, block), gaussian(even, blur), gaussian(amplitude, blur)
 
-    with ThreadPoolExecutor(2) as threads:
-        coarse, even, amplitudes = zip(*threads.map(prepare, grey), strict=True)
-        images = [spline.coefficients(frame) for frame in even]
-        resolved = images if coarse_blur >= MIN_COARSE_BLUR else []
-        blurred = list(threads.map(partial(gaussian, deviation=coarse_blur), resolved))
-        coarse = np.array(coarse) / (np.max(coarse) or 1)
-        tracker = WallTracker(region, ncc, pixels, coarse, block, images, blurred, amplitudes, settings)
-        is_both = settings.reference == "bidirectional" and len(clip.frames) > 2  # of two frames both ways are the same
-        orders = bidirectional.forward_backward(len(clip.frames))[: 1 + is_both]
-        trajectories = list(threads.map(tracker.track, orders))
-        likeness = [match for trajectory in trajectories for match in trajectory.likeness]
-        visible = visibility(likeness, mask.shape, knot_spacing / BLOCKS_PER_KNOT, BLOCKS_PER_KNOT)
-        in_wall = region.positions[region.inside]
-        if 1 - visible.at(in_wall).mean() < LEAST_UNSEEN:
-            return BothWays(region, clip.points, even, trajectories[0], trajectories[-1])
-        trajectories = list(threads.map(replace(tracker, visible=visible).track, orders))
+    means, even, amplitudes = zip(*each(prepare, list(grey)), strict=True)
+    images = [spline.coefficients(frame) for frame in even]
+    resolved = images if coarse_blur >= MIN_COARSE_BLUR else []
+    blurred = each(partial(gaussian, deviation=coarse_blur), resolved)
+    coarse = np.array(means) / (np.max(means) or 1)
+    tracker = WallTracker(region, ncc, pixels, coarse, block, images, blurred, amplitudes, settings)
+    is_both = settings.reference == "bidirectional" and len(clip.frames) > 2  # of two frames both ways are the same
+    orders = bidirectional.forward_backward(len(clip.frames))[: 1 + is_both]
+    trajectories = each(tracker.track, orders)
+    likeness = [match for trajectory in trajectories for match in trajectory.likeness]
+    visible = visibility(likeness, mask.shape, knot_spacing / BLOCKS_PER_KNOT, BLOCKS_PER_KNOT)
+    in_wall = region.positions[region.inside]
+    if 1 - visible.at(in_wall).mean() < LEAST_UNSEEN:
+        return BothWays(region, clip.points, even, trajectories[0], trajectories[-1])
+    trajectories = each(replace(tracker, visible=visible).track, orders)
     return BothWays(region, clip.points, even, trajectories[0], trajectories[-1], visible)
 
 
