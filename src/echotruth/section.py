@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from itertools import pairwise
 from textwrap import dedent
-from types import SimpleNamespace
 from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
 
 from pydantic import (
@@ -24,8 +23,6 @@ from pydantic import (
     model_validator,
 )
 from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError
-
-from echotruth.units import UNITS, unit_of
 
 Positive = Annotated[FiniteFloat, Field(gt=0, le=1e12)]
 """Bounded, so that no product of a few of them overflows."""
@@ -142,18 +139,6 @@ class Section(BaseModel):
                 options.setdefault("description", texts[key])
         return schema
 
-    def si(self) -> SimpleNamespace:
-        """Values in SI units, named without the unit suffix (`pitch_um` becomes `pitch`, m)."""
-        values: dict[str, Any] = {}
-        for key in type(self).model_fields:
-            value, unit = getattr(self, key), unit_of(key)
-            if isinstance(value, Section):
-                value = value.si()
-            elif value is not None and unit:
-                value = _scaled(value, UNITS[unit])
-            values[key.removesuffix(f"_{unit}")] = value
-        return SimpleNamespace(**values)
-
     def given(self) -> dict[str, Any]:
         """Keys and values from which the section can be made again with some of them changed."""
         sections = {key: value for key in type(self).model_fields if isinstance(value := getattr(self, key), Section)}
@@ -180,9 +165,3 @@ class Section(BaseModel):
             details = [InitErrorDetails(type=error, input=None) for error in errors]
             raise ValidationError.from_exception_data(type(self).__name__, details)
         return self
-
-
-def _scaled(value: Any, factor: float) -> Any:
-    if isinstance(value, dict):
-        return {key: item * factor for key, item in value.items()}
-    return [item * factor for item in value] if isinstance(value, list) else value * factor

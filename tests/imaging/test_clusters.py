@@ -78,7 +78,7 @@ def test_the_expansion_of_clusters_is_the_sum_of_their_weighted_and_delayed_echo
         spectra.append(echoes[:, i, j])
         echoes[:, j, i] = echoes[:, i, j]
         phasor = np.exp(-2j * np.pi * np.multiply.outer(frequency, cluster.delay))
-        carry = phasor[:, None] * cluster.weights * phasor[:, cluster.skeleton, None].conj()
+        carry = phasor[:, None] * cluster.weights
         exact = exact + np.einsum("kfi,kfg,kgj->kij", carry, echoes, carry)
     matrix = np.zeros((4, elements, elements), np.complex64)
     add_expanded(matrix, chosen, frequency, np.concatenate(spectra, axis=1).astype(np.complex64))

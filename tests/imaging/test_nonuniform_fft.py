@@ -48,7 +48,7 @@ def test_the_engine_spreads_to_the_same_traces_but_for_rounding(scene, traces):
 def test_transformed_and_divided_by_the_window_they_are_the_exact_sum(scene, traces):
     engine, position, amplitude = scene
     frequency = engine.frequency[::6]
-    loss = _damping(PROBE.si(), frequency)
+    loss = _damping(PROBE, frequency)
     spectra = nonuniform_fft.transform(traces, frequency, loss, _band(PROBE, False).grid)
     found = pulse_spectrum(PROBE, frequency)[:, None, None] * spectra
     exact = exact_matrix(PROBE, position, amplitude, frequency, elevation=False)

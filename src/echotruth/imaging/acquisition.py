@@ -21,6 +21,7 @@ from echotruth.imaging.rf import ring_down
 from echotruth.imaging.rf.aberration import delays, phasors
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
 from echotruth.imaging.rf.shadow import Rib
+from echotruth.units import mm
 
 BYTE_STD = sqrt((256**2 - 1) / 12)
 """Standard deviation of a random byte."""
@@ -47,11 +48,11 @@ class Acquisition:
         realism = config.realism
         self._scanner, self._medium, self._random = scanner, medium, random
         self._haze_range, self._filter, self._matrix = 0.0, None, scanner.matrix
-        self._growth_range = config.rf.si().focus if config.rf.harmonic else 0.0
+        self._growth_range = config.rf.focus_mm * mm if config.rf.harmonic else 0.0
         self._screen = _screen(config, scanner.matrix.frequency, random) if realism.aberration.delay_ns else ()
         if realism.haze.level_dB is not None:
-            echoes = reverberation(realism.haze, config.probe, config.bmode.si().field_of_view, random("haze"))
-            self._haze_range = realism.haze.si().max_source_range
+            echoes = reverberation(realism.haze, config.probe, config.bmode.field_of_view_mm * mm, random("haze"))
+            self._haze_range = realism.haze.max_source_range_mm * mm
             self._filter = 1 + reverberation_filter(echoes, config.probe, scanner.matrix.frequency)
         if realism.shadow.side != "none":
             self._matrix = scanner.matrix.behind(Rib(realism.shadow))

@@ -9,6 +9,7 @@ import numpy as np
 
 from echotruth.config import Bmode, Probe
 from echotruth.imaging.beamforming.scan import Scan
+from echotruth.units import MHz, dB_per_cm_MHz, mm
 
 DROPOUT_WAVES = 64
 """Waves of which the random function of :func:`line_loss` is the sum."""
@@ -25,12 +26,12 @@ def time_gain_compensation(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np
     range_
         Shape (ranges,), m.
     """
-    p, b = probe.si(), bmode.si()
-    attenuation = p.attenuation if b.tgc is None else b.tgc
+    tgc, curve = bmode.tgc_dB_per_cm_MHz, bmode.time_gain
+    attenuation = (probe.attenuation_dB_per_cm_MHz if tgc is None else tgc) * dB_per_cm_MHz
     with np.errstate(over="ignore"):
-        gain = np.exp(2 * attenuation * p.frequency * range_)
-        if b.time_gain.range:
-            gain *= 10 ** (np.interp(range_, b.time_gain.range, b.time_gain.gain) / 20)
+        gain = np.exp(2 * attenuation * (probe.frequency_MHz * MHz) * range_)
+        if curve.range_mm:
+            gain *= 10 ** (np.interp(range_, np.array(curve.range_mm) * mm, curve.gain_dB) / 20)
         return gain.astype(np.float32)
 
 
@@ -86,7 +87,7 @@ def pixel_centres(bmode: Bmode, size: int) -> tuple[np.ndarray, np.ndarray]:
 
     The array is at the middle of the upper edge: axial runs from 0 to the side, lateral from minus to plus half of it.
     """
-    side = bmode.si().field_of_view
+    side = bmode.field_of_view_mm * mm
     axial = (np.arange(size) + 0.5) * side / size
     return axial, axial - side / 2
 

@@ -50,7 +50,7 @@ class Estimator:
     def of(cls, probe: Probe, scanner: Scanner, interval: float) -> Self:
         """The autocorrelator of the lines of a scanner."""
         step = float(scanner.range[1] - scanner.range[0])
-        return cls(scanner.frequency, probe.si().sound_speed, step, interval)
+        return cls(scanner.frequency, probe.sound_speed_m_per_s, step, interval)
 
     def autocorrelations(self, lines: NDArray[np.complex64]) -> tuple[Autocorrelation, Autocorrelation]:
         """Autocorrelations of the lines of a packet (pulses, lines, ranges), averaged over pulses and the gate.

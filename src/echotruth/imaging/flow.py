@@ -10,6 +10,7 @@ from echotruth.config import Config, Probe
 from echotruth.fem.tetrahedra import MaterialPoints, interpolate
 from echotruth.heart import Heart
 from echotruth.imaging.rf.probe import element_centres
+from echotruth.units import MHz, mm
 
 STEPS = {"previous": -1, "next": 1}
 """Frames that flow leads to, in their order along the dimension `to`, and their distance in frames."""
@@ -73,13 +74,13 @@ def slice_thickness(config: Config, range_: Floats) -> Floats:
     """
     if config.phantom.in_plane_only or not config.rf.elevation_beam:
         return np.full(np.shape(range_), np.inf)
-    return np.interp(range_, *_table(config.probe, config.bmode.si().field_of_view))
+    return np.interp(range_, *_table(config.probe, config.bmode.field_of_view_mm * mm))
 
 
 @lru_cache(maxsize=64)
 def _table(probe: Probe, farthest: float) -> tuple[Floats, Floats]:
     """Ranges up to the farthest, m, and the thickness of the beam there, m."""
-    nearest = probe.si().height
+    nearest = probe.height_mm * mm
     range_ = np.linspace(nearest, max(nearest, farthest), _RANGES)
     return range_, beam_thickness(probe, range_)
 
@@ -101,12 +102,13 @@ def beam_thickness(probe: Probe, range_: Floats) -> Floats:
     ndarray of shape (n,), m
         Twice the greatest elevation at which an echo is at least half of the greatest at that range.
     """
-    p, one = probe.si(), probe.model_copy(update={"elements": 1})
+    height, one = probe.height_mm * mm, probe.model_copy(update={"elements": 1})
+    focus, frequency = probe.elevation_focus_mm * mm, probe.frequency_MHz * MHz
     # Beyond the shadow of the element, a beam falls within a wavelength over its height.
-    greatest = p.height / 2 * np.abs(1 - range_ / p.elevation_focus) + range_ * p.sound_speed / p.frequency / p.height
+    greatest = height / 2 * np.abs(1 - range_ / focus) + range_ * probe.sound_speed_m_per_s / frequency / height
     elevation = np.linspace(0, greatest, _ELEVATIONS, axis=-1)
     position = np.stack(np.broadcast_arrays(0.0, range_[:, None], elevation), axis=-1).reshape(-1, 3)
-    echo = np.abs(fresnel(one, position, p.frequency)[0].reshape(elevation.shape)) ** 2
+    echo = np.abs(fresnel(one, position, frequency)[0].reshape(elevation.shape)) ** 2
     over = echo - echo.max(axis=1, keepdims=True) / 2
     rows, last = np.arange(len(over)), _ELEVATIONS - 1 - np.argmax(over[:, ::-1] >= 0, axis=1)
     inner, outer = over[rows, last], over[rows, last + 1]
@@ -131,13 +133,13 @@ def fresnel(probe: Probe, position: Floats, frequency: float) -> NDArray[np.comp
     -------
     ndarray of shape (elements, scatterers), complex
     """
-    p = probe.si()
+    height = probe.height_mm * mm
     range_ = np.hypot(position[:, 0] - element_centres(probe)[:, None], position[:, 1])
-    defocus, slope = 1 / range_ - 1 / p.elevation_focus, position[:, 2] / range_
-    wavenumber = 2 * np.pi * frequency / p.sound_speed
-    phase = wavenumber * p.height / 2 * (np.abs(slope).max() + np.abs(defocus).max() * p.height / 4)
+    defocus, slope = 1 / range_ - 1 / (probe.elevation_focus_mm * mm), position[:, 2] / range_
+    wavenumber = 2 * np.pi * frequency / probe.sound_speed_m_per_s
+    phase = wavenumber * height / 2 * (np.abs(slope).max() + np.abs(defocus).max() * height / 4)
     node, weight = np.polynomial.legendre.leggauss(32 + int(phase))
     response = np.zeros(range_.shape, complex)
-    for h, part in zip(node * p.height / 2, weight / 2, strict=True):
+    for h, part in zip(node * height / 2, weight / 2, strict=True):
         response += part * np.exp(-1j * wavenumber * (h**2 / 2 * defocus - h * slope))
     return response

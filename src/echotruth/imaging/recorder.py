@@ -17,6 +17,7 @@ from echotruth.imaging.beamforming.aperture import sent_apodization
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES
 from echotruth.imaging.rf.full_matrix import PLANE_ACCURACY, FullMatrix
+from echotruth.units import MHz, dB_per_cm_MHz, mm, um
 
 LENS_ACCURACY = 0.01
 """Relative error (L2) of the RF under a lens; see docs/conventions.md."""
@@ -138,15 +139,15 @@ def metadata(config: Config, scanner: Scanner) -> tuple[Arrays, dict[str, Any]]:
 
 
 def _settings(config: Config) -> dict[str, Any]:
-    probe, rf = config.probe.si(), config.rf
+    probe, rf = config.probe, config.rf
     return {
-        "sound_speed": probe.sound_speed,
-        "centre_frequency": probe.frequency,
+        "sound_speed": probe.sound_speed_m_per_s,
+        "centre_frequency": probe.frequency_MHz * MHz,
         "bandwidth": probe.bandwidth,
-        "element_width": probe.width,
-        "element_height": probe.height,
-        "elevation_focus": probe.elevation_focus,
-        "attenuation": probe.attenuation,
+        "element_width": probe.width_um * um,
+        "element_height": probe.height_mm * mm,
+        "elevation_focus": probe.elevation_focus_mm * mm,
+        "attenuation": probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz,
         "transmit": rf.transmit,
         "scan": rf.scan,
         "apodization": rf.apodization,

@@ -1,6 +1,7 @@
 """A sequence: all frames of one view, from the scatterers to the lines."""
 
 import logging
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +10,14 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.beamforming.scanner import Scanner
+from echotruth.imaging.beamforming.scanner import Scanner, full_matrix
 from echotruth.imaging.medium.body import Arrays, Scene
 from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.recorder import RfRecorder
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import frame_times
+from echotruth.units import mm
 
 logger = logging.getLogger("echotruth")
 
@@ -34,19 +36,20 @@ class Sequence:
         Makes a generator of random numbers for each purpose.
     time : ndarray of shape (frame,), s, optional
         Times of the frames. Default: those of the loop.
-
-    Attributes
-    ----------
-    scanner : Scanner
     """
 
     def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random, time: Floats | None = None) -> None:
         self._scene = Scene(config, heart, plane, random, frame_times(config.loop) if time is None else time)
-        self.scanner = Scanner(config.probe, config.rf, config.bmode.si().field_of_view)
+        self._array = config.probe, config.rf, config.bmode.field_of_view_mm * mm
+
+    @cached_property
+    def scanner(self) -> Scanner:
+        """What beamforms the frames; none is needed to draw scatterers."""
+        return Scanner(*self._array)
 
     def scatterers(self) -> Arrays:
         """Draw the scatterers of the view; see :func:`echotruth.imaging.medium.medium.seed_medium`."""
-        return seed_medium(self._scene, self.scanner.matrix.in_beam)
+        return seed_medium(self._scene, full_matrix(*self._array).in_beam)
 
     def acquisition(self, scatterers: Arrays) -> Acquisition:
         """Return what makes the full matrix of any frame."""

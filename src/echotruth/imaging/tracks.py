@@ -10,6 +10,7 @@ from echotruth.fem.tetrahedra import Integers, MaterialPoints, interpolate
 from echotruth.imaging.beamforming.scan import scan_lines
 from echotruth.imaging.flow import out_of_slice, slice_thickness
 from echotruth.imaging.view import Plane
+from echotruth.units import mm
 
 
 def follow(positions: Floats, cells: Integers, plane: Plane, points: Floats, start: ArrayLike = 0) -> Floats:
@@ -63,7 +64,7 @@ def visible(config: Config, followed: Floats, thickness: float | Floats | None =
     ndarray of shape (...), bool
     """
     lateral, axial, elevation = np.moveaxis(followed, -1, 0)
-    side = config.bmode.si().field_of_view
+    side = config.bmode.field_of_view_mm * mm
     shown = (np.abs(lateral) <= side / 2) & (axial >= 0) & (axial <= side)
     scan = scan_lines(config.probe, config.rf)
     line, range_ = scan.to_scan_coordinates(lateral, axial)

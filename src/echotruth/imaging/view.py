@@ -9,6 +9,7 @@ from echotruth.config import Config, Loop, Rf, View
 from echotruth.config.imaging import Breathing, Excursion, ViewMotion
 from echotruth.heart import SHORT_AXIS, Heart, RigidMotion
 from echotruth.loop.cycle import frame_times, period
+from echotruth.units import deg, mm, per_min
 
 BEATS_PER_BREATH = 4.5
 """Heart rate 241 M^-0.25 over respiratory rate 53.5 M^-0.26, M the mass of a mammal (Stahl 1967)."""
@@ -54,17 +55,18 @@ def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
     -------
     Plane
     """
-    apex, si = endo_ed[:, 2].min(), view.si()
+    apex, tilt, offset = endo_ed[:, 2].min(), view.tilt_deg * deg, view.offset
     if view.plane == "short_axis":
-        axes = tilted(SHORT_AXIS, si.tilt)
+        axes = tilted(SHORT_AXIS, tilt)
         centre = np.array([0, 0, view.position * apex])
     else:
-        cos, sin = np.cos(si.rotation), np.sin(si.rotation)
-        axes = tilted(np.array([[-cos, -sin, 0], [0, 0, 1.0], [-sin, cos, 0]]), si.tilt)
+        cos, sin = np.cos(view.rotation_deg * deg), np.sin(view.rotation_deg * deg)
+        axes = tilted(np.array([[-cos, -sin, 0], [0, 0, 1.0], [-sin, cos, 0]]), tilt)
         # Half the length of the cavity from the middle of the base, which is the origin of the heart frame.
         centre = apex / 2 * axes[1] + 0.0  # no -0.0
-    axes = turned(axes, si.angle)
-    return Plane(centre + si.offset.lateral * axes[0] - (rf.si().focus - si.offset.axial) * axes[1], axes)
+    axes = turned(axes, view.angle_deg * deg)
+    depth = rf.focus_mm * mm - offset.axial_mm * mm
+    return Plane(centre + offset.lateral_mm * mm * axes[0] - depth * axes[1], axes)
 
 
 def tilted(axes: Floats, angle: float) -> Floats:
@@ -143,9 +145,9 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop, time: Floa
     """
     if motion == ViewMotion():
         return heart
-    beat, si = period(loop), motion.si()
+    beat = period(loop)
     time = frame_times(loop)[: len(heart.displacement)] if time is None else time
-    angle = si.rocking * raised_cosine(2 * np.pi * time / beat)
+    angle = motion.rocking_deg * deg * raised_cosine(2 * np.pi * time / beat)
     shift = np.outer(time / beat, _vector(motion.drift))
     shift += np.outer(inspiration(motion.breathing, time, beat), _vector(motion.breathing))
     rotation = [plane.axes.T @ rotation_in_image(each) @ plane.axes for each in angle]
@@ -170,9 +172,9 @@ def inspiration(breathing: Breathing, time: Floats, period: float) -> Floats:
     -------
     ndarray of shape (frame,)
     """
-    si = breathing.si()
-    rate = 1 / (BEATS_PER_BREATH * period) if si.rate is None else si.rate
-    return raised_cosine(2 * np.pi * rate * time + si.phase) - raised_cosine(np.array(si.phase))
+    per_minute, phase = breathing.rate_per_min, breathing.phase_deg * deg
+    rate = 1 / (BEATS_PER_BREATH * period) if per_minute is None else per_minute * per_min
+    return raised_cosine(2 * np.pi * rate * time + phase) - raised_cosine(np.array(phase))
 
 
 def raised_cosine(phase: Floats) -> Floats:
@@ -182,5 +184,4 @@ def raised_cosine(phase: Floats) -> Floats:
 
 def _vector(excursion: Excursion) -> Floats:
     """Lateral, axial and elevation component, (3,), m."""
-    si = excursion.si()
-    return np.array([si.lateral, si.axial, si.elevation])
+    return np.array([excursion.lateral_mm, excursion.axial_mm, excursion.elevation_mm]) * mm

@@ -9,6 +9,7 @@ import numpy as np
 
 from echotruth.config import Probe, Rf
 from echotruth.imaging.rf.probe import element_centres
+from echotruth.units import um
 
 MIN_WIDTH = 2
 """Least width of an aperture, pitches, so that near points have one too."""
@@ -46,7 +47,7 @@ class Aperture:
     """
 
     def __init__(self, probe: Probe, rf: Rf):
-        pitch = probe.si().pitch
+        pitch = probe.pitch_um * um
         self.centres = element_centres(probe)
         self.tapered, self._sends_tapered = (each == "hann" for each in (rf.apodization, sent_apodization(rf)))
         self._harmonic = rf.harmonic

@@ -127,7 +127,7 @@ def echo_time_range(probe: Probe, zone: Zone, range_: np.ndarray, points: tuple)
     # All paths grow with range, so that the ends of the lines suffice.
     lateral, axial = (coordinate[:, [0, -1], None] for coordinate in points)
     path = range_[[0, -1], None] + np.hypot(lateral - element_centres(probe), axial)
-    time, delay = path / probe.si().sound_speed, zone.transmits.delay
+    time, delay = path / probe.sound_speed_m_per_s, zone.transmits.delay
     earliest = time[:, 0].min(axis=1) - delay.max(axis=1)
     latest = time[:, 1].max(axis=1) - delay.min(axis=1)
     return float(earliest.min()), float(latest.max())

@@ -18,6 +18,7 @@ from echotruth.imaging.beamforming.scan import Linear, Scan, sample_positions
 from echotruth.imaging.beamforming.transmit import Transmits
 from echotruth.imaging.rf.probe import pulse_band, pulse_spectrum
 from echotruth.threads import share
+from echotruth.units import MHz, um
 
 TAPS = 16
 """Samples from which a value is interpolated."""
@@ -87,12 +88,12 @@ def interpolate(values, first, weights, result, part):
 
 def range_resampling(probe: Probe, range_: np.ndarray) -> Resampling:
     """Resampling over ranges (ranges,), m, of lines that are demodulated at the centre frequency."""
-    p, (low, high) = probe.si(), pulse_band(probe)
+    centre, (low, high) = probe.frequency_MHz * MHz, pulse_band(probe)
     frequency = np.linspace(low, high, FREQUENCIES)
-    half_band = max(high - p.frequency, p.frequency - SLOWEST * low)
-    samples = OVERSAMPLING * 2 * half_band * 2 * (range_[-1] - range_[0]) / p.sound_speed
-    wavenumber, power = 2 * (frequency - p.frequency) / p.sound_speed, pulse_spectrum(probe, frequency) ** 2
-    return Resampling(range_, wavenumber, power, 1 + int(np.ceil(samples)))
+    half_band = max(high - centre, centre - SLOWEST * low)
+    samples = OVERSAMPLING * 2 * half_band * 2 * (range_[-1] - range_[0]) / probe.sound_speed_m_per_s
+    wavenumber = 2 * (frequency - centre) / probe.sound_speed_m_per_s
+    return Resampling(range_, wavenumber, pulse_spectrum(probe, frequency) ** 2, 1 + int(np.ceil(samples)))
 
 
 def line_resampling(probe: Probe, rf: Rf, scan: Scan, transmits: Transmits, depth: float) -> Resampling:
@@ -112,12 +113,12 @@ def line_resampling(probe: Probe, rf: Rf, scan: Scan, transmits: Transmits, dept
     """
     if isinstance(scan, Linear):
         return Resampling(scan.line_origin, np.zeros(1), np.ones(1), len(scan.line_origin))
-    p, frequency = probe.si(), np.linspace(*pulse_band(probe), FREQUENCIES)
+    pitch, frequency = probe.pitch_um * um, np.linspace(*pulse_band(probe), FREQUENCIES)
     aperture, whole = Aperture(probe, rf), (np.zeros(1), np.inf)
-    sent = aperture.sent_weights(*whole)[0] if len(transmits.foci) else sent_from(transmits, scan, depth, p.pitch)
+    sent = aperture.sent_weights(*whole)[0] if len(transmits.foci) else sent_from(transmits, scan, depth, pitch)
     both = np.convolve(aperture.weights(*whole)[0], sent)
-    position = (np.arange(len(both)) - (len(both) - 1) / 2) * p.pitch
-    rate = np.outer(frequency / p.sound_speed, position).ravel()
+    position = (np.arange(len(both)) - (len(both) - 1) / 2) * pitch
+    rate = np.outer(frequency / probe.sound_speed_m_per_s, position).ravel()
     power = np.outer(pulse_spectrum(probe, frequency), both).ravel() ** 2
     fastest = np.argsort(-np.abs(rate))
     beyond = np.searchsorted(np.cumsum(power[fastest]), LEFT_OUT**2 * power.sum())

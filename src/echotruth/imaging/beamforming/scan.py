@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from echotruth.config import Probe, Rf
+from echotruth.units import deg, mm, um
 
 
 @dataclass(frozen=True)
@@ -62,15 +63,15 @@ Scan = Sector | Linear
 
 def scan_lines(probe: Probe, rf: Rf) -> Scan:
     """Lines of a frame; those of a linear scan span the array, or `rf.width_mm` if that is set."""
-    half = (rf.si().sector if rf.scan == "sector" else scan_width(probe, rf)) / 2
+    half = (rf.sector_deg * deg if rf.scan == "sector" else scan_width(probe, rf)) / 2
     values = np.linspace(-half, half, rf.lines)
     return Sector(values) if rf.scan == "sector" else Linear(values)
 
 
 def scan_width(probe: Probe, rf: Rf) -> float:
     """Distance between the outermost lines of a linear scan, m."""
-    length = probe.elements * probe.si().pitch
-    width = rf.si().width or length
+    length = probe.elements * (probe.pitch_um * um)
+    width = rf.width_mm * mm if rf.width_mm else length
     if width > length * (1 + 1e-9):
         raise ValueError(f"Lines over {1e3 * width:g} mm need a longer array: this one measures {1e3 * length:g} mm.")
     return width

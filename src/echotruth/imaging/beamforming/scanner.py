@@ -11,6 +11,7 @@ from echotruth.imaging.beamforming.scan import Scan, sample_positions, scan_line
 from echotruth.imaging.beamforming.synthesis import TransmitSynthesis, channel_sampling
 from echotruth.imaging.beamforming.transmit import TRANSMIT_SEQUENCES, Zone
 from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.units import MHz
 
 __all__ = ["Scanner", "validate_scatterers"]
 
@@ -53,12 +54,10 @@ class Scanner:
     """
 
     def __init__(self, probe: Probe, rf: Rf, depth: float):
-        p = probe.si()
-        if not np.isfinite(depth) or depth < 20 * p.sound_speed / p.frequency:
+        speed = probe.sound_speed_m_per_s
+        if not np.isfinite(depth) or depth < 20 * speed / (probe.frequency_MHz * MHz):
             raise ValueError(f"The depth is {depth:g} m; it must be at least twenty wavelengths.")
-        step = p.sound_speed / (2 * p.sampling)
-        self.scan = scan_lines(probe, rf)
-        self.range = step * np.arange(1, int(depth / step) + 2)
+        self.scan, self.range, imaged = scan_lines(probe, rf), sample_ranges(probe, depth), rf
         transmits = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, self.scan)
         self._over_range = range_resampling(probe, self.range)
         self._over_lines = line_resampling(probe, rf, self.scan, transmits, self.range[-1])
@@ -66,12 +65,11 @@ class Scanner:
         sampled, range_ = scan_lines(probe, rf), self._over_range.samples
         zones = TRANSMIT_SEQUENCES[rf.transmit](probe, rf, sampled).zones(range_)
         latest = max(np.abs(zone.transmits.delay).max() for zone in zones)
-        farthest = np.hypot(*sample_positions(self.scan, self.range)).max()
-        self.matrix = FullMatrix(probe, farthest, latest, rf.elevation_beam)
+        self.matrix = full_matrix(probe, imaged, depth, latest)
         self._sampling = channel_sampling(self.matrix)
         self._zones = [_ZoneBeamformer(probe, rf, self.matrix, sampled, range_, zone) for zone in zones]
         self.frequency = self._zones[0].synthesis.frequency
-        self._carrier = np.exp(-4j * np.pi * self.frequency / p.sound_speed * range_).astype(np.complex64)
+        self._carrier = np.exp(-4j * np.pi * self.frequency / speed * range_).astype(np.complex64)
 
     @property
     def angle(self) -> np.ndarray:
@@ -110,16 +108,27 @@ class Scanner:
         return self._over_range(self._over_lines(lines).T.copy()).T.copy()
 
 
+def sample_ranges(probe: Probe, depth: float) -> np.ndarray:
+    """Distances of the samples from the origin of their line up to a depth, m: (ranges,), m."""
+    step = probe.sound_speed_m_per_s / (2 * (probe.sampling_MHz * MHz))
+    return step * np.arange(1, int(depth / step) + 2)
+
+
+def full_matrix(probe: Probe, rf: Rf, depth: float, latest: float = 0.0) -> FullMatrix:
+    """The echoes from which lines of a depth, m, are made with delays of up to `latest`, s."""
+    farthest = np.hypot(*sample_positions(scan_lines(probe, rf), sample_ranges(probe, depth))).max()
+    return FullMatrix(probe, farthest, latest, rf.elevation_beam)
+
+
 class _ZoneBeamformer:
     """Beamforming of the samples of the lines of a scan, at ranges (ranges,), m, that are in a focal zone."""
 
     def __init__(self, probe: Probe, rf: Rf, matrix: FullMatrix, scan: Scan, range_: np.ndarray, zone: Zone):
-        p = probe.si()
         self.zone, self._range = zone, range_[zone.samples]
         self._points = sample_positions(scan, self._range)
         time_range = echo_time_range(probe, zone, self._range, self._points) if len(zone.transmits.foci) else None
-        self.synthesis = TransmitSynthesis(matrix, p.frequency, zone.transmits, time_range)
-        self._start_path = p.sound_speed * self.synthesis.start
+        self.synthesis = TransmitSynthesis(matrix, probe.frequency_MHz * MHz, zone.transmits, time_range)
+        self._start_path = probe.sound_speed_m_per_s * self.synthesis.start
         self._receive = ReceiveFocus(
             Aperture(probe, rf),
             scan.line_origin,
@@ -127,7 +136,7 @@ class _ZoneBeamformer:
             self._points,
             frequency=self.synthesis.carrier,
             sampling=self.synthesis.sampling,
-            sound_speed=p.sound_speed,
+            sound_speed=probe.sound_speed_m_per_s,
         )
 
     def __call__(self, matrix: np.ndarray) -> np.ndarray:

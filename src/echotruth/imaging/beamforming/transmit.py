@@ -13,6 +13,7 @@ from echotruth.config import Probe, Rf
 from echotruth.imaging.beamforming.aperture import Aperture
 from echotruth.imaging.beamforming.scan import Scan
 from echotruth.imaging.rf.probe import element_centres
+from echotruth.units import deg, mm, um
 
 
 @dataclass(frozen=True)
@@ -91,9 +92,9 @@ def focused_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     The foci are `rf.focal_zones`, `rf.focal_spacing_mm` apart, with `rf.focus_mm` in their middle. A wave reaches its
     focus at (focal range) / (speed of sound), as if it came from the origin of the line.
     """
-    aperture, values = Aperture(probe, rf), rf.si()
-    foci = values.focus + (np.arange(rf.focal_zones) - (rf.focal_zones - 1) / 2) * values.focal_spacing
-    delay = np.concatenate([_advance(aperture.centres, scan, focus) for focus in foci]) / probe.si().sound_speed
+    aperture, number = Aperture(probe, rf), np.arange(rf.focal_zones) - (rf.focal_zones - 1) / 2
+    foci = rf.focus_mm * mm + number * (rf.focal_spacing_mm * mm)
+    delay = np.concatenate([_advance(aperture.centres, scan, focus) for focus in foci]) / probe.sound_speed_m_per_s
     weight = np.concatenate([aperture.sent_weights(scan.line_origin, focus) for focus in foci])
     origin = np.tile(np.stack([scan.line_origin, np.zeros(len(scan.line_origin))], axis=1), (len(foci), 1))
     return Transmits(delay, weight, origin, np.zeros(len(origin)), foci=foci)
@@ -108,7 +109,7 @@ def _advance(centres: np.ndarray, scan: Scan, focus: float) -> np.ndarray:
 def plane_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     """Plane waves of evenly spaced angles, all elements alike (Montaldo 2009, IEEE Trans UFFC 56:489)."""
     direction = _directions(rf)
-    delay = direction[:, :1] * element_centres(probe) / probe.si().sound_speed
+    delay = direction[:, :1] * element_centres(probe) / probe.sound_speed_m_per_s
     return Transmits(delay, np.ones(delay.shape), direction, np.zeros(len(delay)), is_plane=True)
 
 
@@ -121,7 +122,7 @@ def diverging_waves(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
     distance = virtual_source_distance(probe, rf)
     origin = -distance * _directions(rf)
     delay = np.hypot(element_centres(probe) - origin[:, :1], origin[:, 1:]) - distance
-    return Transmits(delay / probe.si().sound_speed, np.ones(delay.shape), origin, np.full(len(delay), distance))
+    return Transmits(delay / probe.sound_speed_m_per_s, np.ones(delay.shape), origin, np.full(len(delay), distance))
 
 
 def synthetic_aperture(probe: Probe, rf: Rf, scan: Scan) -> Transmits:
@@ -143,12 +144,14 @@ TRANSMIT_SEQUENCES = {
 
 def virtual_source_distance(probe: Probe, rf: Rf) -> float:
     """Distance of the virtual sources of diverging waves from the centre of the array, m."""
-    length = probe.elements * probe.si().pitch
-    return rf.si().virtual_source or length / 2 / np.tan(rf.si().sector / 2)
+    if rf.virtual_source_mm:
+        return rf.virtual_source_mm * mm
+    length = probe.elements * (probe.pitch_um * um)
+    return length / 2 / np.tan(rf.sector_deg * deg / 2)
 
 
 def _directions(rf: Rf) -> np.ndarray:
     """Lateral and axial components of the directions of the waves, shape (transmits, 2), 1."""
-    half = rf.si().angle_span / 2
+    half = rf.angle_span_deg * deg / 2
     angle = np.linspace(-half, half, rf.transmits) if rf.transmits > 1 else np.zeros(1)
     return np.stack([np.sin(angle), np.cos(angle)], axis=1)

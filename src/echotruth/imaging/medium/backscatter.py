@@ -17,6 +17,7 @@ from echotruth.config.realism import Backscatter
 from echotruth.fem.tetrahedra import MaterialPoints, jacobian, shape_gradient
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane
+from echotruth.units import mm
 
 WAVES = 64
 """Waves of which the random function of :func:`variation` is the sum."""
@@ -32,7 +33,7 @@ def variation(backscatter: Backscatter, position: Floats, random: np.random.Gene
     std, level = backscatter.variation_dB, np.zeros(len(position))
     if std == 0:
         return np.ones(len(position))
-    wave_vectors = random.standard_normal((WAVES, 3)) / backscatter.si().variation_length
+    wave_vectors = random.standard_normal((WAVES, 3)) / (backscatter.variation_length_mm * mm)
     for wave_vector, phase in zip(wave_vectors, random.uniform(0, 2 * np.pi, WAVES), strict=True):
         level += std * sqrt(2 / WAVES) * np.cos(position @ wave_vector + phase)
     mean_dB = std**2 * log(10) / 20

@@ -17,8 +17,10 @@ from echotruth.imaging.medium.anatomy import rim_normal
 from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
 from echotruth.imaging.medium.random_process import RandomProcess, brownian, diffusion_std
 from echotruth.imaging.medium.wall import draw_in_cells, max_jacobian
+from echotruth.imaging.rf.probe import wavelength
 from echotruth.loop.cycle import period
 from echotruth.mechanics.geometry.boundary import triangle_edges
+from echotruth.units import ms, per_mm3
 
 MAX_DIFFUSION = 5
 """Offset that blood is assumed not to exceed over a cycle, in standard deviations."""
@@ -91,7 +93,7 @@ class Blood(Body):
         blood, cavity = config.realism.blood, Cavity(heart.endo)
         frames = range(len(heart.displacement))
         bound = np.max([max_jacobian(cavity.positions(heart.positions(k)), cavity.cells) for k in frames], axis=0)
-        points, threshold = draw_in_cells(blood.density * config.phantom.si().density, bound, random)
+        points, threshold = draw_in_cells(blood.density * (config.phantom.density_per_mm3 * per_mm3), bound, random)
         amplitude = blood.amplitude_std * random.standard_normal(len(points))
         return cls(scene, points.cell, points.xi, threshold, amplitude)
 
@@ -136,8 +138,8 @@ class Blood(Body):
     @property
     def _decorrelation(self) -> tuple[float, float]:
         """Time constant of the echo of blood, s, and wavelength, m."""
-        probe = self.scene.config.probe.si()
-        return self.scene.config.realism.blood.si().decorrelation_time, probe.sound_speed / probe.frequency
+        config = self.scene.config
+        return config.realism.blood.decorrelation_time_ms * ms, wavelength(config.probe)
 
     @cached_property
     def _diffusion(self) -> RandomProcess:

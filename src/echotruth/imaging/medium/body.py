@@ -20,6 +20,7 @@ from echotruth.fem.location import locate
 from echotruth.heart import Heart
 from echotruth.imaging.medium.random_process import Random, ar1
 from echotruth.imaging.view import Plane
+from echotruth.units import ms
 
 Arrays = dict[str, NDArray[Any]]
 Echoes = tuple[Floats, Floats, Floats]
@@ -51,8 +52,8 @@ class Scene:
 
     def fading(self, amplitude: Floats, name: str) -> Callable[[int], Floats]:
         """Amplitudes (n,) of a body by frame: constant, or decorrelating."""
-        constant = self.config.realism.decorrelation.si().time
-        return (lambda _: amplitude) if constant is None else ar1(amplitude, self.time, constant, name, self.random)
+        time_ms = self.config.realism.decorrelation.time_ms
+        return (lambda _: amplitude) if time_ms is None else ar1(amplitude, self.time, time_ms * ms, name, self.random)
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,8 @@ from echotruth.fem.tetrahedra import Integers, shape, shape_gradient
 from echotruth.imaging.medium.backscatter import variation
 from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
 from echotruth.imaging.medium.wall import cube_to_simplex
+from echotruth.imaging.rf.probe import wavelength
+from echotruth.units import MHz, mm, per_mm3, um
 
 BEAM_STD, PULSE_STD = 0.376, 0.375
 """Standard deviation of the two-way beam at its focus, a sinc squared, over wavelength x focus / aperture; and of the
@@ -95,19 +97,17 @@ def border_amplitude(config: Config, level_dB: float) -> float:
     level_dB : float
         Echo power of a flat border across the beam at its focus over that of muscle.
     """
-    probe, focus = config.probe.si(), config.rf.si().focus
-    wavelength = probe.sound_speed / probe.frequency
-    lateral = BEAM_STD * wavelength * focus / (probe.elements * probe.pitch)
-    elevation = BEAM_STD * wavelength * focus / probe.height
-    axial = PULSE_STD * probe.sound_speed / 2 / (probe.bandwidth * probe.frequency)
-    power = config.phantom.si().density * sqrt(pi) * axial / (4 * pi * lateral * elevation)
+    probe, focus = config.probe, config.rf.focus_mm * mm
+    lateral = BEAM_STD * wavelength(probe) * focus / (probe.elements * (probe.pitch_um * um))
+    elevation = BEAM_STD * wavelength(probe) * focus / (probe.height_mm * mm)
+    axial = PULSE_STD * probe.sound_speed_m_per_s / 2 / (probe.bandwidth * (probe.frequency_MHz * MHz))
+    power = config.phantom.density_per_mm3 * per_mm3 * sqrt(pi) * axial / (4 * pi * lateral * elevation)
     return 10 ** (level_dB / 20) * sqrt(power) / border_density(config)
 
 
 def border_density(config: Config) -> float:
     """Scatterers of a border per area, 1/m^2: one per two squares of the wavelength."""
-    probe = config.probe.si()
-    return (probe.frequency / probe.sound_speed) ** 2 / 2
+    return (config.probe.frequency_MHz * MHz / config.probe.sound_speed_m_per_s) ** 2 / 2
 
 
 def _area(nodes: Floats, facets: Integers, xi: Floats) -> Floats:

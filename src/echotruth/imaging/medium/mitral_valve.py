@@ -33,6 +33,7 @@ from echotruth.imaging.medium.body import CavityBody, Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
 from echotruth.imaging.medium.filling import course, opening
 from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
+from echotruth.units import per_mm3
 
 MEETING, TENTING = 2 / 3, 0.28
 """Share of the annulus that the anterior leaflet spans, and depth at which both meet, over the distance between both
@@ -179,7 +180,7 @@ class Leaflets(CavityBody):
         level = cls.level_dB(scene.config)
         amplitude = border_amplitude(scene.config, level)
         parts = [_drawn_leaflet(scene, side, radius, amplitude) for side in LEAFLETS]
-        density = scene.config.phantom.si().density
+        density = scene.config.phantom.density_per_mm3 * per_mm3
         parts.append(_drawn_annulus(random("annulus"), density * radius**3, 10 ** ((level + ANNULUS_DB) / 20)))
         if scene.config.realism.neighbours.papillary_muscles_dB is not None:
             spacing = CHORDAE_SPACING * border_density(scene.config) ** -0.5 / radius

@@ -26,6 +26,7 @@ from echotruth.heart import Heart
 from echotruth.imaging.medium.anatomy import sampled
 from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.body import CavityBody, Scene
+from echotruth.units import per_mm3
 
 AZIMUTHS = (0.9 * pi, 1.47 * pi)
 """Of the anterolateral and of the posteromedial muscle, rad."""
@@ -70,7 +71,7 @@ class PapillaryMuscles(CavityBody):
         for number, azimuth in enumerate(AZIMUTHS):
             muscle = PapillaryMuscle(scene.heart, azimuth)
             low, high = muscle.extent
-            candidates = random.poisson(scene.config.phantom.si().density * (high - low).prod())
+            candidates = random.poisson(scene.config.phantom.density_per_mm3 * per_mm3 * (high - low).prod())
             position = muscle.to_heart(0, random.uniform(low, high, (candidates, 3)))
             position = position[muscle.contains(0, position)]
             parts.append((position, np.full(len(position), number, np.uint8)))

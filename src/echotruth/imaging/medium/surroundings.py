@@ -33,7 +33,9 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.medium.body import Body, Echoes, Scene
 from echotruth.imaging.medium.filling import emptied, volumes
 from echotruth.imaging.medium.random_process import ar1
+from echotruth.imaging.rf.probe import wavelength
 from echotruth.imaging.view import Plane
+from echotruth.units import mm, ms, per_mm3
 
 NEIGHBOURS = 8
 """Epicardial nodes from which the motion of a scatterer is interpolated."""
@@ -166,7 +168,7 @@ class Surroundings(Body):
         in_heart = plane.to_heart(position)
         tissue, power = tissues(config, scene.heart, plane, in_heart)
         sign = np.where(random.random(len(position)) < 0.5, -1.0, 1.0)
-        amplitude = sign * np.sqrt(power * config.phantom.si().density / density)
+        amplitude = sign * np.sqrt(power * (config.phantom.density_per_mm3 * per_mm3) / density)
         present = power > 0
         return cls(scene, in_heart[present], amplitude[present], tissue[present])
 
@@ -192,14 +194,14 @@ class Surroundings(Body):
 
     @cached_property
     def _motion(self) -> SurroundingsMotion:
-        decay = self.scene.config.realism.surroundings.si().motion_decay
+        decay = self.scene.config.realism.surroundings.motion_decay_mm * mm
         return SurroundingsMotion(self.scene.heart, self.position, decay, self.tissue)
 
     @cached_property
     def _amplitudes(self) -> Callable[[int], Floats]:
         """Amplitudes (n,) by frame: blood changes as that in the cavity."""
         scene, sign, blood = self.scene, np.sign(self.amplitude), np.isin(self.tissue, CAVITIES)
-        constant = scene.config.realism.blood.si().decorrelation_time
+        constant = scene.config.realism.blood.decorrelation_time_ms * ms
         # Both of all, so that random numbers do not depend on the tissue, which last bits decide at edges.
         flowing = ar1(sign, scene.time, constant, "chambers", scene.random)
         fading = scene.fading(sign, self.name)
@@ -234,11 +236,11 @@ def outside_heart(heart: Heart, frame: int, position: Floats, *, column: bool = 
 
 def _drawn_evenly(config: Config, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Positions in the image (n, 3), m, and the density there, (n,), 1/m^3."""
-    start, depth = config.realism.surroundings.si().start, config.bmode.si().field_of_view
-    scan, focus = scan_lines(config.probe, config.rf), config.rf.si().focus
+    start, depth = config.realism.surroundings.start_mm * mm, config.bmode.field_of_view_mm * mm
+    scan, focus = scan_lines(config.probe, config.rf), config.rf.focus_mm * mm
     if depth <= start:
         return np.empty((0, 3)), np.empty(0)
-    at_focus = config.realism.surroundings.density * config.phantom.si().density
+    at_focus = config.realism.surroundings.density * (config.phantom.density_per_mm3 * per_mm3)
     focal_thickness = beam_half_thickness(config, np.array([focus]))[0]
     width = DRAWN * (np.ptp(scan.angle) * focus if isinstance(scan, Sector) else np.ptp(scan.line_origin))
     number = random.poisson(at_focus * width * (depth - start) * 2 * CUT * focal_thickness * STD)
@@ -277,7 +279,7 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
         levels[root == TissueLabel.AORTIC_WALL] += AORTIC_WALL_DB
         tissue[chambers > 0], level[chambers > 0] = chambers[chambers > 0], levels[chambers > 0]
     if realism.neighbours.chest_wall_dB is not None:
-        start = realism.surroundings.si().start
+        start = realism.surroundings.start_mm * mm
         depth, (lateral, axial, _) = chest_wall_depth(heart, plane, start), plane.to_image(position).T
         near, thickness = axial < depth, max(depth - start, 1e-12)
         tissue[near] = TissueLabel.CHEST_WALL
@@ -332,6 +334,6 @@ def beam_half_thickness(config: Config, range_: Floats) -> Floats:
 
     Beyond, the two-way beam is 26 dB and more below its maximum.
     """
-    p = config.probe.si()
-    rays = p.height / 2 * np.abs(1 - range_ / p.elevation_focus)
-    return rays + p.sound_speed / p.frequency * range_ / p.height
+    probe, height = config.probe, config.probe.height_mm * mm
+    rays = height / 2 * np.abs(1 - range_ / (probe.elevation_focus_mm * mm))
+    return rays + wavelength(probe) * range_ / height

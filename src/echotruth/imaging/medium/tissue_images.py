@@ -27,6 +27,7 @@ from echotruth.imaging.medium.papillary_muscles import AZIMUTHS, PapillaryMuscle
 from echotruth.imaging.medium.surroundings import SurroundingsMotion, tissues
 from echotruth.imaging.medium.tricuspid_valve import TricuspidValve
 from echotruth.imaging.view import Plane
+from echotruth.units import mm
 
 Labels = NDArray[np.uint8]
 CavityPart = MitralValve | AorticValve | TricuspidValve | PapillaryMuscle
@@ -86,15 +87,15 @@ class TissueImages:
         """Pixels outside the scan, or nearer than the tissue begins, (n_axial, n_lateral)."""
         scan = scan_lines(self._config.probe, self._config.rf)
         line, range_ = scan.to_scan_coordinates(self._lateral, self._axial[:, None])
-        begins = self._config.realism.surroundings.si().start
-        beyond = (range_ < begins) | (range_ > self._config.bmode.si().field_of_view)
+        begins = self._config.realism.surroundings.start_mm * mm
+        beyond = (range_ < begins) | (range_ > self._config.bmode.field_of_view_mm * mm)
         return (line < 0) | (line > len(scan.angle) - 1) | beyond
 
     @cached_property
     def _motions(self) -> list[Callable[[int], Floats]]:
         """Positions of the knots, (n, 3), m, if there is tissue of an atrium, the chest wall, or any other."""
         knots = self._in_heart_frame(*(np.linspace(at[0], at[-1], KNOTS) for at in (self._axial, self._lateral)))
-        decay = self._config.realism.surroundings.si().motion_decay
+        decay = self._config.realism.surroundings.motion_decay_mm * mm
         kinds = (TissueLabel.LEFT_ATRIUM, TissueLabel.CHEST_WALL, TissueLabel.RIGHT_VENTRICLE)
         return [SurroundingsMotion(self._heart, knots, decay, np.full(len(knots), kind, np.uint8)) for kind in kinds]
 

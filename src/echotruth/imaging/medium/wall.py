@@ -14,6 +14,8 @@ from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import EDGES, Integers, MaterialPoints, interpolate, jacobian
 from echotruth.imaging.medium.backscatter import FibreEcho, variation
 from echotruth.imaging.medium.body import Body, Echoes, Scene, echoes
+from echotruth.imaging.rf.probe import wavelength
+from echotruth.units import mm, per_mm3
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +106,7 @@ def seed_volume(
     MaterialPoints of length n
         Their number is Poisson distributed about density times volume, as in a uniform random medium.
     """
-    points, threshold = draw_in_cells(phantom.si().density, max_jacobian(nodes, cells), random)
+    points, threshold = draw_in_cells(phantom.density_per_mm3 * per_mm3, max_jacobian(nodes, cells), random)
     # Elements are curved: rejection by the local Jacobian makes the density uniform within each.
     accepted = threshold < np.linalg.det(jacobian(nodes, cells, points))
     return MaterialPoints(points.cell[accepted], points.xi[accepted])
@@ -127,11 +129,11 @@ def seed_section(scene: Scene, random: np.random.Generator) -> MaterialPoints:
     Their areal density is the volumetric one times the thickness of the beam at its elevation focus,
     wavelength x focus / height.
     """
-    heart, plane, array = scene.heart, scene.plane, scene.config.probe.si()
-    thickness = array.sound_speed / array.frequency * array.elevation_focus / array.height
+    heart, plane, probe = scene.heart, scene.plane, scene.config.probe
+    thickness = wavelength(probe) * (probe.elevation_focus_mm * mm) / (probe.height_mm * mm)
     nodes = plane.to_image(heart.positions(0))[:, :2]
     low, size = nodes.min(axis=0), np.ptp(nodes, axis=0)
-    candidates = random.poisson(scene.config.phantom.si().density * thickness * size.prod())
+    candidates = random.poisson(scene.config.phantom.density_per_mm3 * per_mm3 * thickness * size.prod())
     position = np.column_stack([low + size * random.random((candidates, 2)), np.zeros(candidates)])
     points = locate(heart.positions(0), heart.cells, plane.to_heart(position))
     inside = points.cell >= 0

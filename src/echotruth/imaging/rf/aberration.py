@@ -14,6 +14,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Probe
 from echotruth.config.realism import Aberration
 from echotruth.imaging.rf.probe import element_centres
+from echotruth.units import mm, ns, um
 
 STEPS = 8
 """Random numbers in a correlation length, at least, of which delays are the weighted sum."""
@@ -28,18 +29,17 @@ def delays(aberration: Aberration, probe: Probe, random: np.random.Generator) ->
     Their mean and their slope along the array, which would only shift and turn the image, are taken out, and their root
     mean square is then that of the key.
     """
-    si, centres = aberration.si(), element_centres(probe)
-    step = min(si.correlation_length / STEPS, probe.si().pitch)
-    margin = CUT * si.correlation_length
+    length, centres = aberration.correlation_length_mm * mm, element_centres(probe)
+    step, margin = min(length / STEPS, probe.pitch_um * um), CUT * length
     place = np.arange(centres[0] - margin, centres[-1] + margin + step, step)
     # Its correlation with itself is that of the delays.
-    weight = np.exp(-8 * log(2) * ((centres[:, None] - place) / si.correlation_length) ** 2)
+    weight = np.exp(-8 * log(2) * ((centres[:, None] - place) / length) ** 2)
     drawn = weight @ random.standard_normal(len(place))
     drawn -= drawn.mean()
     if len(centres) > 2:
         drawn -= centres * (centres @ drawn) / (centres @ centres)
     rms = np.sqrt(np.square(drawn).mean())
-    return drawn * (si.delay / rms) if rms else drawn
+    return drawn * (aberration.delay_ns * ns / rms) if rms else drawn
 
 
 def phasors(delay: Floats, frequency: Floats) -> np.ndarray:

@@ -21,7 +21,7 @@ from scipy import linalg
 
 from echotruth.arrays import Floats
 from echotruth.imaging.rf.kernel import Band
-from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, padded, product
+from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, WIDTH, padded, product
 from echotruth.imaging.rf.shadow import Rib
 from echotruth.threads import share
 
@@ -67,6 +67,13 @@ class Cluster:
     skeleton: NDArray[np.int64]
     weights: Floats
     delay: Floats
+
+    def remove_delay(self, spectra: NDArray[np.complex64], frequency: Floats) -> None:
+        """Take the delays of both elements out of spectra (bins, pairs i <= j of the skeleton) at frequencies, Hz."""
+        phase = 2 * np.pi * np.multiply.outer(frequency, self.delay[self.skeleton])
+        phasor = (np.cos(phase) + 1j * np.sin(phase)).astype(np.complex64)
+        i, j = np.triu_indices(len(self.skeleton))
+        spectra *= phasor[:, i] * phasor[:, j]
 
 
 class Clusters:
@@ -190,37 +197,34 @@ def add_expanded(
     clusters : list of Cluster
     frequency : ndarray of shape (bins,), Hz
     spectra : ndarray of shape (bins, pairs), complex64
-        Spectra of the pairs of skeleton elements, cluster by cluster.
+        Spectra of the pairs of skeleton elements without their delays, cluster by cluster.
     """
-    first = np.cumsum([0] + [padded(len(cluster.skeleton), HEIGHT) for cluster in clusters])
-    elements, skeleton = matrix.shape[1], np.full(first[-1], -1)
-    weights = np.zeros((first[-1], padded(elements) + ROW_PADDING), np.float32)
-    for start, cluster in zip(first, clusters, strict=False):
-        rows = slice(start, start + len(cluster.skeleton))
-        weights[rows, :elements], skeleton[rows] = cluster.weights, cluster.skeleton
+    sizes, elements = np.array([len(cluster.skeleton) for cluster in clusters]), matrix.shape[1]
+    rows = padded(sizes, HEIGHT)
+    weights = np.zeros((rows.sum(), padded(elements) + ROW_PADDING), np.float32)
+    for cluster, size, start in zip(clusters, sizes, np.cumsum(rows) - rows, strict=True):
+        weights[start : start + size, :elements] = cluster.weights
     phase = -2 * np.pi * np.multiply.outer(frequency, np.stack([cluster.delay for cluster in clusters]))
     phasor = np.zeros((len(frequency), len(clusters), 2, padded(elements)), np.float32)
     phasor[..., :elements] = np.stack([np.cos(phase), np.sin(phase)], axis=2)
-    share(partial(expand, spectra, first, skeleton, weights, phasor, matrix), len(spectra))
+    share(partial(expand, spectra, sizes, weights, phasor, matrix), len(spectra))
 
 
 @numba.njit(nogil=True, cache=True)
-def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
+def expand(spectra, sizes, weights, phasor, matrix, bins):
     """Add the echoes of all pairs of elements, summed over clusters.
 
-    A cluster of skeleton echoes M, weights W and phasors z = exp(-2 pi i f delay) adds diag(z) W^T M' W diag(z), with
-    M' = M without the delays.
+    A cluster of skeleton echoes M without their delays, weights W and phasors z = exp(-2 pi i f delay) adds
+    diag(z) W^T M W diag(z).
 
     Parameters
     ----------
     spectra
         Shape (bins, pairs), complex64: of the pairs i <= j of the skeleton of every cluster, one after the other.
-    first
-        Row of the weights where each cluster begins, and their number: shape (clusters + 1,).
-    skeleton
-        Number of the element of every row, -1 where it is only there to fill, shape (rows,).
+    sizes
+        Elements of the skeleton of each cluster, shape (clusters,).
     weights
-        Shape (rows, width + ROW_PADDING), float32.
+        Shape (rows, width + ROW_PADDING), float32; the rows of a cluster are filled up to a multiple of HEIGHT.
     phasor
         Real and imaginary part of z for each cluster, shape (bins, clusters, 2, width), float32; as many columns as
         elements or more.
@@ -232,16 +236,21 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
     width, count = phasor.shape[3], matrix.shape[1]
     echoes = np.empty((2, width, width), np.float32)
     for f in range(*bins):
-        total, pair = np.zeros((2, width, width), np.float32), 0
-        for k in range(len(first) - 1):
-            own, size = weights[first[k] : first[k + 1]], first[k + 1] - first[k]
-            c, s = phasor[f, k, 0], phasor[f, k, 1]
-            few, half = np.zeros((2, size, size), np.float32), np.empty((size, weights.shape[1]), np.float32)
-            pair += remove_delay(spectra[f, pair:], skeleton[first[k] : first[k + 1]], c, s, few[0], few[1])
+        total, row, pair = np.zeros((2, width, width), np.float32), 0, 0
+        for k in range(len(sizes)):
+            rows = -(-sizes[k] // HEIGHT) * HEIGHT
+            own, few = weights[row : row + rows], np.zeros((2, rows, rows), np.float32)
+            half = np.empty((rows, width), np.float32)
+            for i in range(sizes[k]):
+                for j in range(i, sizes[k]):
+                    few[0, i, j] = few[0, j, i] = spectra[f, pair].real
+                    few[1, i, j] = few[1, j, i] = spectra[f, pair].imag
+                    pair += 1
             for part in range(2):
                 product(few[part], own, half)
                 product(own, half, echoes[part], True)
-            add_delayed(echoes, c, s, total)
+            add_delayed(echoes, phasor[f, k, 0], phasor[f, k, 1], total)
+            row += rows
         for i in range(count):
             for j in range(i, count):
                 matrix[f, i, j] += np.complex64(complex(total[0, i, j], total[1, i, j]))
@@ -249,37 +258,19 @@ def expand(spectra, first, skeleton, weights, phasor, matrix, bins):
 
 
 @numba.njit(cache=True)
-def remove_delay(spectra, skeleton, c, s, real, imaginary):
-    """Take the delays of a cluster out of the echoes of its pairs (pairs,): (few, few). Returns the number of pairs."""
-    pair = 0
-    for i in range(len(skeleton)):
-        if skeleton[i] < 0:
-            break
-        for j in range(i, len(skeleton)):
-            if skeleton[j] < 0:
-                break
-            m, n = skeleton[i], skeleton[j]
-            p, q = c[m] * c[n] - s[m] * s[n], c[m] * s[n] + s[m] * c[n]
-            value = spectra[pair]
-            real[i, j] = real[j, i] = value.real * p + value.imag * q
-            imaginary[i, j] = imaginary[j, i] = value.imag * p - value.real * q
-            pair += 1
-    return pair
-
-
-@numba.njit(cache=True)
 def add_delayed(echoes, c, s, total):
     """Add E_ij z_i z_j, z = c + i s, to the upper triangle of a total; E and it (2, n, n): real and imaginary parts."""
     for i in range(len(c)):
-        real, imaginary = total[0, i, i:], total[1, i, i:]
-        add_turned(echoes[0, i, i:], echoes[1, i, i:], c[i:], s[i:], c[i], s[i], real, imaginary)
+        # From the tile on in which the diagonal is, as compilers vectorise whole ones.
+        n = i // WIDTH * WIDTH
+        real, imaginary = total[0, i, n:], total[1, i, n:]
+        add_turned(echoes[0, i, n:], echoes[1, i, n:], c[n:], s[n:], c[i], s[i], real, imaginary)
 
 
 @numba.njit(cache=True)
 def add_turned(a, b, c, s, p, q, real, imaginary):
     """Add (a + i b) (c + i s) (p + i q), p and q being numbers, to real + i imaginary."""
-    # Loops over few arrays each, from 0 on, which compilers vectorise.
     for j in range(len(c)):
-        real[j] += a[j] * (c[j] * p - s[j] * q) - b[j] * (c[j] * q + s[j] * p)
-    for j in range(len(c)):
-        imaginary[j] += a[j] * (c[j] * q + s[j] * p) + b[j] * (c[j] * p - s[j] * q)
+        cosine, sine = c[j] * p - s[j] * q, c[j] * q + s[j] * p
+        real[j] += a[j] * cosine - b[j] * sine
+        imaginary[j] += a[j] * sine + b[j] * cosine

@@ -8,6 +8,8 @@ first order in 1/r. Where they see a scatterer at ranges too different for that,
 frequency (:mod:`~echotruth.imaging.rf.frequency_sum`).
 """
 
+from functools import cached_property
+
 import numba
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.config import Probe
 from echotruth.imaging.rf.kernel import Band, fit_kernel, stack_real_imaginary
+from echotruth.units import MHz, mm, um
 
 BEAM_TAIL_ENERGY = 1.3e-4
 """Energy of the echoes that are left out beside the beam, over that of all echoes from scatterers at the same range."""
@@ -57,21 +60,19 @@ class Lens:
         g = (dE / d(1/r)) / E over the band: real part that of the amplitude, imaginary part that of the phase.
     derivative_residual : ndarray of shape (CURVATURES, slopes, NODES), complex64, m
         dE / d(1/r) less what g makes of E, without the delay.
-    blocks : ndarray of shape (CURVATURES, slopes), uint8
-        Blocks of samples that an echo needs; one more than `MAX_BLOCKS` where these are not enough.
     edge_slope : ndarray of shape (CURVATURES,)
         Slope at which the beam ends: scatterers evenly spread beyond it together have `BEAM_TAIL_ENERGY` of the
         energy of all at that range.
     """
 
     def __init__(self, probe: Probe, max_range: float, band: Band) -> None:
-        p = probe.si()
-        slopes = int(SLOPES_PER_BEAMWIDTH * MAX_SLOPE * p.height * p.frequency / p.sound_speed) + 2
+        height, centre = probe.height_mm * mm, probe.frequency_MHz * MHz
+        slopes = int(SLOPES_PER_BEAMWIDTH * MAX_SLOPE * height * centre / probe.sound_speed_m_per_s) + 2
         self.slope = np.linspace(0, MAX_SLOPE, slopes)
-        self.curvature = np.linspace(min(1 / max_range, 1 / p.height), 2 / p.height, CURVATURES)
+        self.curvature = np.linspace(min(1 / max_range, 1 / height), 2 / height, CURVATURES)
         beam, derivative = self._fresnel_integrals(probe, band)
-        angular_frequency = 2 * np.pi * p.frequency
-        self.log_derivative = _log_derivative(beam, derivative, band, p.frequency)
+        angular_frequency = 2 * np.pi * centre
+        self.log_derivative = _log_derivative(beam, derivative, band, centre)
         self.delay = _delays(beam**2, band) / 2
         # Traces are damped by arrival time, but attenuation depends on path length: compensate for the lens delay.
         undamped = band.loss + 2j * np.pi * band.frequency
@@ -80,11 +81,18 @@ class Lens:
         derivative -= (self.log_derivative.real[..., None] + phase_slope) * beam
         self.derivative_residual = (advance * derivative).astype(np.complex64)
         self.beam = (advance * beam).astype(np.complex64)
-        self.blocks = _blocks(self.beam**2, band)
         self.edge_slope = _edge_slope(self.beam**2, band, self.slope)
-        self._response = _response(self.beam, band)
-        self._half_aperture, self._height = (p.elements - 1) * p.pitch / 2, p.height
-        self._wavenumber = angular_frequency / p.sound_speed
+        self._band, self._response = band, _response(self.beam, band)
+        self._half_aperture, self._height = (probe.elements - 1) * (probe.pitch_um * um) / 2, height
+        self._wavenumber = angular_frequency / probe.sound_speed_m_per_s
+
+    @cached_property
+    def blocks(self) -> NDArray[np.uint8]:
+        """Blocks of samples that an echo needs, (CURVATURES, slopes); one more than `MAX_BLOCKS` if these are too few.
+
+        They take a third of the time to set up the tables, and who only asks what is in the beam needs none.
+        """
+        return _blocks(self.beam**2, self._band)
 
     def in_beam(self, position: Floats) -> NDArray[np.bool_]:
         """Which scatterers at positions (n, 3), m, are within the beam, (n,)."""
@@ -128,12 +136,11 @@ class Lens:
 
     def _fresnel_integrals(self, probe: Probe, band: Band) -> tuple[NDArray, NDArray]:
         """E, and its derivative with respect to 1/range at a fixed elevation, (CURVATURES, slopes, NODES)."""
-        p = probe.si()
-        wavenumber = 2 * np.pi * band.frequency / p.sound_speed
-        defocus = self.curvature - 1 / p.elevation_focus
-        phase = wavenumber.max() * p.height / 2 * (MAX_SLOPE + np.abs(defocus).max() * p.height / 4)
+        size, wavenumber = probe.height_mm * mm, 2 * np.pi * band.frequency / probe.sound_speed_m_per_s
+        defocus = self.curvature - 1 / (probe.elevation_focus_mm * mm)
+        phase = wavenumber.max() * size / 2 * (MAX_SLOPE + np.abs(defocus).max() * size / 4)
         node, weight = np.polynomial.legendre.leggauss(32 + int(phase))
-        height = node * p.height / 2
+        height = node * size / 2
         elevation = self.slope / self.curvature[:, None]
         shape = (len(self.curvature), len(self.slope), len(wavenumber))
         beam, derivative = np.empty(shape, complex), np.empty(shape, complex)

@@ -15,9 +15,11 @@ from __future__ import annotations
 
 from functools import partial
 from math import ceil, factorial, floor
+from typing import Any
 
 import numba
 import numpy as np
+from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import NDArray
 from scipy import fft
 from scipy.special import wofz
@@ -28,6 +30,7 @@ from echotruth.imaging.rf.directivity import STEPS, sinc
 from echotruth.imaging.rf.probe import pulse_band, spectral_width
 from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, padded, product
 from echotruth.threads import share
+from echotruth.units import MHz, dB_per_cm_MHz, mm, um
 
 GATE, LEAST, MOST, MARGIN = 48, 64, 1024, 4.5
 """Samples of two-way time, or half of those in which the first echoes arrive if that is more, in which scatterers lie
@@ -47,6 +50,9 @@ LOWEST = 0.005
 """Least frequency of the waves over the highest of the band; those of lower frequencies are nearly the same."""
 LEAST_CURVATURE = 1e-3
 """Least phase a at the centre frequency, rad; the waves of the edges would be infinite at 0, and their sum is not."""
+
+PAIRS = 64
+"""Traces transformed at a time."""
 
 SINE = tuple(np.float32((-1) ** n / factorial(2 * n + 1)) for n in range(6))
 COSINE = tuple(np.float32((-1) ** n / factorial(2 * n)) for n in range(7))
@@ -68,33 +74,45 @@ class FrequencySum:
     """
 
     def __init__(self, probe: Probe, sampling: float, samples: int) -> None:
-        self._probe, self._sampling, self._samples = probe, sampling, samples
-        p, (low, high), skirt = probe.si(), pulse_band(probe), SKIRT * spectral_width(probe)
+        self._sampling, self._samples = sampling, samples
+        self._centre, self._pulse_width = probe.frequency_MHz * MHz, spectral_width(probe)
+        (low, high), skirt, speed = pulse_band(probe), SKIRT * self._pulse_width, probe.sound_speed_m_per_s
         self._band = max(low - skirt, 0.0), high + skirt
         self._waves = low, high = max(low - skirt, LOWEST * high), high + skirt
-        self._node = np.polynomial.legendre.leggauss(NODES)[0]
-        frequency = np.sqrt(low * high) * (high / low) ** (self._node / 2)
+        node = leggauss(NODES)[0]
+        self._polynomials = np.linalg.inv(legvander(node, NODES - 1))
+        frequency = np.sqrt(low * high) * (high / low) ** (node / 2)
         squares = np.minimum(np.arange(STEPS + 2) / STEPS, 1)
-        width = np.pi * p.width * frequency / p.sound_speed
+        width = np.pi * (probe.width_um * um) * frequency / speed
         self._tables = edge_wave(EDGE_STEPS), sinc(np.multiply.outer(squares, width**2)).astype(np.float32)
-        self._lens = p.height, p.elevation_focus, LEAST_CURVATURE / (2 * np.pi * p.frequency)
-        self._medium = frequency, p.sound_speed, p.attenuation
+        least = LEAST_CURVATURE / (2 * np.pi * self._centre)
+        self._lens = probe.height_mm * mm, probe.elevation_focus_mm * mm, least
+        self._medium = frequency, speed, probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz
 
-    def __call__(self, centres: Floats, delay: Floats, scatterers: Scatterers) -> NDArray[np.float32]:
-        """Traces of all pairs i <= j of some elements, without the delays of both.
+    def add(
+        self, spectra: NDArray[np.complex64], first_bin: int, array: tuple[Floats, Floats], scatterers: Scatterers
+    ) -> None:
+        """Add the spectra of all pairs i <= j of some elements, without the delays of both.
 
         Parameters
         ----------
-        centres, delay : ndarray of shape (few,), m and s
+        spectra : ndarray of shape (bins, pairs), complex64
+            Added to, in the band of the pulse.
+        first_bin : int
+            The first of their bins in the spectrum of the record.
+        array : tuple of ndarray of shape (few,), m and s
             Lateral coordinates of the elements, and the delay of each, about which echoes arrive.
         scatterers : Scatterers
-
-        Returns
-        -------
-        ndarray of shape (pairs, samples), float32
-            Their spectra are right in the band of the pulse.
         """
-        traces = np.zeros((len(centres) * (len(centres) + 1) // 2, self._samples), np.float32)
+        traces, threads = self._traces(array, scatterers), numba.get_num_threads()
+        for start in range(0, len(traces), PAIRS):
+            found = fft.rfft(traces[start : start + PAIRS], axis=1, workers=threads)
+            spectra[:, start : start + PAIRS] += found[:, first_bin : first_bin + len(spectra)].T
+
+    def _traces(self, array: tuple[Floats, Floats], scatterers: Scatterers) -> NDArray[np.float32]:
+        """Traces of the pairs, (pairs, samples); their spectra are right in the band of the pulse."""
+        (centres, delay), pairs = array, np.triu_indices(len(array[0]))
+        traces = np.zeros((len(pairs[0]), self._samples), np.float32)
         range_ = np.linalg.norm(scatterers[0], axis=1)
         order, stop = np.argsort(range_, kind="stable"), 0
         while (start := stop) < len(order):
@@ -104,8 +122,8 @@ class FrequencySum:
             stop = start + min(max(within, LEAST), MOST)
             position, amplitude, exponent, passes = (each[order[start:stop]] for each in scatterers)
             first, length = self._window(position, centres, delay)
-            own = position, amplitude, exponent, passes
-            spectra = self._gate(own, centres, delay + first / self._sampling / 2, length)
+            own, late = (position, amplitude, exponent, passes), delay + first / self._sampling / 2
+            spectra = self._gate(own, (centres, late), pairs, length)
             echoes = fft.irfft(spectra, length, axis=1, workers=numba.get_num_threads())
             # A gate may begin before time 0; what is there stands at the end of the record.
             begin = first % self._samples
@@ -116,57 +134,57 @@ class FrequencySum:
 
     def _window(self, position: Floats, centres: Floats, delay: Floats) -> tuple[int, int]:
         """First sample in which echoes of scatterers (n, 3), m, arrive, and number of samples up to the last."""
-        p, beside = self._probe.si(), np.abs(position[:, 2:])
+        (height, focus, _), speed, beside = self._lens, self._medium[1], np.abs(position[:, 2:])
         range_ = np.hypot(position[:, :1] - centres, position[:, 1:2])
         # From the nearest and the farthest part of the height of an element, less the path from its centre.
-        half, nearest = p.height / 2, np.minimum(beside, p.height / 2)
-        early = nearest * (beside - nearest / 2) / range_ + half**2 / (2 * p.elevation_focus)
+        half, nearest = height / 2, np.minimum(beside, height / 2)
+        early = nearest * (beside - nearest / 2) / range_ + half**2 / (2 * focus)
         late = half * (beside + half / 2) / range_
-        distance, margin = np.hypot(range_, beside), MARGIN / (2 * np.pi * spectral_width(self._probe))
-        first = floor((2 * ((distance - early) / p.sound_speed - delay).min() - margin) * self._sampling)
-        last = ceil((2 * ((distance + late) / p.sound_speed - delay).max() + margin) * self._sampling)
+        distance, margin = np.hypot(range_, beside), MARGIN / (2 * np.pi * self._pulse_width)
+        first = floor((2 * ((distance - early) / speed - delay).min() - margin) * self._sampling)
+        last = ceil((2 * ((distance + late) / speed - delay).max() + margin) * self._sampling)
         return first, min(fft.next_fast_len(min(last - first, self._samples), real=True), self._samples)
 
-    def _gate(self, scatterers: Scatterers, centres: Floats, delay: Floats, length: int) -> NDArray[np.complex64]:
+    def _gate(
+        self, scatterers: Scatterers, array: tuple[Floats, Floats], pairs: tuple[Any, Any], length: int
+    ) -> NDArray[np.complex64]:
         """Spectra of a record of so many samples, without the delays of elements: (pairs, length // 2 + 1)."""
-        (low, high), step, few = self._band, self._sampling / length, len(centres)
+        (low, high), step, few, (i, j) = self._band, self._sampling / length, len(array[0]), pairs
         bins = np.arange(max(ceil(low / step), 1), floor(high / step) + 1)
         frequency, width = np.maximum(bins * step, self._waves[0]), padded(few)
         position, amplitude, exponent, passes = scatterers
         blocks = -(-len(position) // BLOCK)
         waves = np.zeros((blocks, WAVES, 2, NODES, BLOCK * width + ROW_PADDING), np.float32)
         arrival = np.zeros((blocks, WAVES, BLOCK * width))
-        inputs = (position, passes), (centres, delay), self._lens, self._medium, self._tables
+        inputs = (position, passes), array, self._lens, self._medium, self._tables
         share(partial(send, *inputs, waves, arrival), len(position))
         loss = 2 * self._medium[2] * np.linalg.norm(position, axis=1)
-        ratio = np.log(frequency / self._probe.si().frequency)
+        ratio = np.log(frequency / self._centre)
         strength = np.zeros((len(bins), blocks * BLOCK), np.float32)
         growth = np.multiply.outer(ratio, exponent) - np.multiply.outer(frequency, loss)
         strength[:, : len(position)] = (self._pulse(frequency) / frequency)[:, None] * amplitude * np.exp(growth)
         sums, carry = np.zeros((len(bins), 2, padded(few, HEIGHT), width), np.float32), self._carry(frequency)
         share(partial(add_echoes, waves, arrival, carry, (bins[0] * step, step), strength, sums), len(carry))
-        spectra = np.zeros((few * (few + 1) // 2, length // 2 + 1), np.complex64)
-        i, j = np.triu_indices(few)
-        parts = sums.reshape(len(bins), 2, -1)
+        spectra, parts = np.zeros((len(i), length // 2 + 1), np.complex64), sums.reshape(len(bins), 2, -1)
         spectra.real[:, bins] = parts[:, 0].take(i * width + j, axis=1).T
         spectra.imag[:, bins] = -(parts[:, 1].take(i * width + j, axis=1) + parts[:, 1].take(j * width + i, axis=1)).T
         if low == 0:
-            spectra[:, 0] = self._pulse(0.0) * _at_rest(scatterers, centres)[i, j]
+            spectra[:, 0] = self._pulse(0.0) * _at_rest(scatterers, array[0])[i, j]
         return spectra
 
     def _pulse(self, frequency: Floats | float) -> Floats:
         """Spectrum of the pulse, which is not cut off."""
-        return np.exp(-((frequency - self._probe.si().frequency) ** 2) / (2 * spectral_width(self._probe) ** 2))
+        return np.exp(-((frequency - self._centre) ** 2) / (2 * self._pulse_width**2))
 
     def _carry(self, frequency: Floats) -> NDArray[np.float32]:
         """Weights of the values at the nodes in those at frequencies (n,), Hz: (groups, NODES, GROUP).
 
         The values are those of the polynomial in the logarithm of the frequency through the nodes.
         """
-        vander, (low, high) = np.polynomial.legendre.legvander, self._waves
+        low, high = self._waves
         place = 2 * np.log(frequency / low) / np.log(high / low) - 1
         weights = np.zeros((padded(len(frequency), GROUP), NODES), np.float32)
-        weights[: len(frequency)] = vander(place, NODES - 1) @ np.linalg.inv(vander(self._node, NODES - 1))
+        weights[: len(frequency)] = legvander(place, NODES - 1) @ self._polynomials
         return np.ascontiguousarray(weights.reshape(-1, GROUP, NODES).transpose(0, 2, 1))
 
 
@@ -337,7 +355,6 @@ def add_turned(a, b, c, s, real, imaginary):
     """Add (a + i b) (c + i s) to real + i imaginary, all of shape (n,), float32."""
     for n in range(len(a)):
         real[n] += a[n] * c[n] - b[n] * s[n]
-    for n in range(len(a)):
         imaginary[n] += a[n] * s[n] + b[n] * c[n]
 
 

@@ -31,13 +31,14 @@ from echotruth.imaging.rf import directivity, kernel, spreading
 from echotruth.imaging.rf.attenuation import separable_damping
 from echotruth.imaging.rf.clusters import Cluster, Clusters, add_expanded
 from echotruth.imaging.rf.elevation import MAX_BLOCKS, Lens
-from echotruth.imaging.rf.frequency_sum import FrequencySum
+from echotruth.imaging.rf.frequency_sum import PAIRS, FrequencySum
 from echotruth.imaging.rf.kernel import NODES, TAPS, Band, Grid, stack_real_imaginary
-from echotruth.imaging.rf.lens_kernels import group_blocks, lens_kernels
+from echotruth.imaging.rf.lens_kernels import lens_kernels
 from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
-from echotruth.imaging.rf.product import padded
+from echotruth.imaging.rf.product import HEIGHT, padded
 from echotruth.imaging.rf.shadow import Rib
 from echotruth.threads import share
+from echotruth.units import MHz, dB_per_cm_MHz, um
 
 BLOCK = 256
 """Scatterers spread at a time."""
@@ -109,39 +110,39 @@ class FullMatrix:
     _rib: Rib | None = None
 
     def __init__(self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True) -> None:
-        p = probe.si()
-        self._width = p.width * p.frequency / p.sound_speed
+        centre, speed = probe.frequency_MHz * MHz, probe.sound_speed_m_per_s
+        self._width = probe.width_um * um * centre / speed
         self._scheme = (LENS if self._width <= MAX_NARROW_WIDTH else WIDE) if elevation else PLANE
         band = _band(probe, elevation)
         self.sampling = band.grid.sampling
         half_pulse = 4.5 / (2 * np.pi * spectral_width(probe))
-        self.max_range = depth + p.sound_speed * half_pulse / 2
-        last = 2 * self.max_range / p.sound_speed + p.elements * p.pitch / p.sound_speed + half_pulse
+        self.max_range = depth + speed * half_pulse / 2
+        last = 2 * self.max_range / speed + probe.elements * (probe.pitch_um * um) / speed + half_pulse
         margin = 2 * spreading.LEAD + MAX_BLOCKS * TAPS
         self.samples = _record_length(int((last + 2 * max_delay) * self.sampling) + margin)
         if self.samples >= 1 << (31 - spreading.FRACTION_BITS):
             remedy = "decrease the depth of the image or probe.sampling_MHz"
             raise ValueError(f"A record of {self.samples} samples is too long: {remedy}.")
         self.centres = element_centres(probe)
-        self.sound_speed = p.sound_speed
-        loss = p.attenuation * p.frequency
-        self._scales = self.sampling / p.sound_speed, loss, p.frequency / p.sound_speed
+        self.sound_speed = speed
+        loss = probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz * centre
+        self._scales = self.sampling / speed, loss, centre / speed
         self._directivity = directivity.directivity_table(self._width)
         self._set_filters(probe, band.grid)
         self._lens = _lens(probe, self.max_range) if elevation else None
         if self._lens:
             self._sum = FrequencySum(probe, self.sampling, self.samples)
-        self._clusters = Clusters(self.centres, p.sound_speed, band, self.max_range, CLUSTER_TOLERANCE[elevation])
-        self._tabulate(band, band.frequency / p.frequency)
+        self._clusters = Clusters(self.centres, speed, band, self.max_range, CLUSTER_TOLERANCE[elevation])
+        self._tabulate(band, band.frequency / centre)
 
     def _set_filters(self, probe: Probe, grid: Grid) -> None:
         """Set the filters that convert gridded traces to echoes: pairs of a function of time and a response."""
-        p, (low, high) = probe.si(), pulse_band(probe)
+        low, high = pulse_band(probe)
         cycles = np.arange(self.samples // 2 + 1) / self.samples
         inside = np.flatnonzero((cycles * self.sampling >= low) & (cycles * self.sampling <= high))
         self.first_bin = int(inside[0])
         self.frequency = cycles[inside] * self.sampling
-        rate = _damping(p, self.frequency)
+        rate = _damping(probe, self.frequency)
         time = (np.arange(self.samples) - spreading.LEAD) / self.sampling
         damping, filters = separable_damping(rate, time)
         window = kernel.window_spectrum(grid.complex_frequency(self.frequency, rate), grid.sharpness)
@@ -149,7 +150,7 @@ class FullMatrix:
         advance = np.exp(2j * np.pi * cycles[inside] * spreading.LEAD)  # rows begin LEAD samples before time 0
         self._damping = damping.astype(np.float32)
         self._responses = (filters * response * advance).astype(np.complex64)
-        self._ratio = self.frequency / p.frequency
+        self._ratio = self.frequency / (probe.frequency_MHz * MHz)
 
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
         """Set the tables of kernels without the lens, or the lookup tables from which those with the lens are made."""
@@ -244,18 +245,18 @@ class FullMatrix:
         position, amplitude = position[inside], amplitude[inside].astype(np.float32)
         powers = np.broadcast_to(exponent, inside.shape)[inside]
         passes, transfer = (np.zeros(len(inside), bool), np.ones(1)) if filtered is None else filtered
-        passes, transfers = passes[inside], (np.ones(1, np.float32), transfer.astype(np.complex64))
+        passes, response = passes[inside], transfer.astype(np.complex64)[:, None]
         numbers = self._clusters.worth_expanding(self._clusters.numbers(position))
         matrix = np.zeros((len(self.frequency), *[len(self.centres)] * 2), np.complex64)
         clusters, spectra = [], []
         for number in np.unique(numbers):
             own, cluster = numbers == number, self._clusters[number]
             clusters.append(cluster)
-            parts = ((own & (passes == which), transfers[int(which)]) for which in np.unique(passes[own]))
-            echoes = (
-                self._skeleton_spectra(cluster, position[part], amplitude[part], powers[part]) * transfer[:, None]
-                for part, transfer in parts
-            )
+            echoes = []
+            for through in np.unique(passes[own]):
+                part = own & (passes == through)
+                found = self._skeleton_spectra(cluster, position[part], amplitude[part], powers[part])
+                echoes.append(found * response if through else found)
             spectra.append(reduce(np.add, echoes))
             if sum(each.nbytes for each in spectra) > EXPANDED or number == numbers.max():
                 add_expanded(matrix, clusters, self.frequency, np.concatenate(spectra, axis=1))
@@ -265,42 +266,33 @@ class FullMatrix:
     def _skeleton_spectra(
         self, cluster: Cluster, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray
     ) -> np.ndarray:
-        """Spectra of the echoes of pairs of the skeleton elements of a cluster: (bins, pairs)."""
-        spread, spectra = np.ones(len(position), bool), []
-        if self._lens:
-            spread = self._lens.spreads(position)
-            if not spread.all():
-                spectra.append(self._summed(cluster, *(each[~spread] for each in (position, amplitude, exponent))))
+        """Spectra of the echoes of pairs of the skeleton elements of a cluster, without its delays: (bins, pairs)."""
+        few = len(cluster.skeleton)
+        spectra = np.zeros((len(self.frequency), few * (few + 1) // 2), np.complex64)
+        spread = self._lens.spreads(position) if self._lens else np.ones(len(position), bool)
         for power in np.unique(exponent[spread]):
             own = spread & (exponent == power)
             responses = (self._responses * self._ratio**power).astype(np.complex64)
-            traces = self._traces(cluster.skeleton, position[own], amplitude[own])
-            spectra.append(self._spectra(traces, self._damping, responses))
-        return reduce(np.add, spectra)
+            self._add_spectra(spectra, self._traces(cluster.skeleton, position[own], amplitude[own]), responses)
+        if spread.any() and cluster.delay.any():
+            cluster.remove_delay(spectra, self.frequency)
+        if not spread.all():
+            centres, delay = self.centres[cluster.skeleton], cluster.delay[cluster.skeleton]
+            position, amplitude, exponent = (each[~spread] for each in (position, amplitude, exponent))
+            passes = self._rib.transmission(position, centres) if self._rib else np.ones((len(position), few))
+            self._sum.add(spectra, self.first_bin, (centres, delay), (position, amplitude, exponent, passes))
+        return spectra
 
-    def _summed(
-        self, cluster: Cluster, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray
-    ) -> np.ndarray:
-        """Spectra of pairs of the skeleton elements, of echoes summed frequency by frequency: (bins, pairs)."""
-        centres, delay = self.centres[cluster.skeleton], cluster.delay[cluster.skeleton]
-        passes = self._rib.transmission(position, centres) if self._rib else np.ones((len(position), len(centres)))
-        traces = self._sum(centres, delay, (position, amplitude, exponent, passes))
-        spectra = self._spectra(traces, np.ones((1, 1), np.float32), np.ones((1, 1), np.complex64))
-        i, j = np.triu_indices(len(delay))
-        phase = -2 * np.pi * np.multiply.outer(self.frequency, delay)
-        phasor = (np.cos(phase) + 1j * np.sin(phase)).astype(np.complex64)
-        return spectra * (phasor[:, i] * phasor[:, j]) if delay.any() else spectra
-
-    def _spectra(self, traces: np.ndarray, damping: np.ndarray, responses: np.ndarray) -> np.ndarray:
-        """Spectra (bins, pairs) of traces (pairs, samples): sums over functions of time, and of frequency after it."""
+    def _add_spectra(self, spectra: np.ndarray, traces: np.ndarray, responses: np.ndarray) -> None:
+        """Add to spectra (bins, pairs) those of traces (pairs, samples), damped and filtered by the responses."""
         band, threads = slice(self.first_bin, self.first_bin + len(self.frequency)), numba.get_num_threads()
-        total = np.zeros((len(self.frequency), len(traces)), np.complex64)
-        for start in range(0, len(traces), 64):
-            some = traces[start : start + 64]
-            for fading, response in zip(damping, responses, strict=True):
-                faded = some if (fading == 1).all() else some * fading
-                total[:, start : start + 64] += (fft.rfft(faded, axis=1, workers=threads)[:, band] * response).T
-        return total
+        for start in range(0, len(traces), PAIRS):
+            some = traces[start : start + PAIRS]
+            echoes = (
+                fft.rfft(some * fading, axis=1, workers=threads)[:, band] * response
+                for fading, response in zip(self._damping, responses, strict=True)
+            )
+            spectra[:, start : start + PAIRS] += reduce(np.add, echoes).T
 
 
 class _PlaneKernels:
@@ -340,11 +332,10 @@ class _LensKernels:
         """Lens terms, kernel blocks and tables of some of the scatterers, for :mod:`.spreading`."""
         own = slice(*np.searchsorted(self._owner, [part.start, part.stop]))
         entries = self._entries[own] - [part.start, 0]
-        tables = self._tables[: len(entries)]
-        groups = group_blocks(entries[:, 1])
+        order, tables = np.argsort(entries[:, 1], kind="stable"), self._tables[: len(entries)]
         scatterers = self._index[part], self._angle[part]
-        made = partial(lens_kernels, *scatterers, self._full._lookup, self._terms, entries, tables, groups)
-        share(made, len(groups))
+        made = partial(lens_kernels, *scatterers, self._full._lookup, self._terms, entries, order, tables)
+        share(made, -(-len(entries) // HEIGHT))
         blocks = np.column_stack([entries[:, 0], self._base[: len(entries)], self._first[own]])
         return self._lens_terms[part], blocks, tables.ravel()
 
@@ -362,9 +353,10 @@ def _phases(scheme: int) -> int:
     return 1 << spreading.PHASE_BITS[scheme]
 
 
-def _damping(p, frequency: np.ndarray) -> np.ndarray:
+def _damping(probe: Probe, frequency: np.ndarray) -> np.ndarray:
     """Rate alpha (f - f0) c at which an echo at these frequencies fades faster than at the centre frequency, 1/s."""
-    return p.attenuation * (frequency - p.frequency) * p.sound_speed
+    attenuation = probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz
+    return attenuation * (frequency - probe.frequency_MHz * MHz) * probe.sound_speed_m_per_s
 
 
 @lru_cache(maxsize=1)
@@ -376,11 +368,11 @@ def _lens(probe: Probe, max_range: float) -> Lens:
 def _band(probe: Probe, elevation: bool) -> Band:
     """Band of the pulse, and the grid that samples it, with or without the lens."""
     low, high = pulse_band(probe)
-    grid = Grid(max(probe.si().sampling, high / MAX_BAND[elevation]), SHARPNESS[elevation])
+    grid = Grid(max(probe.sampling_MHz * MHz, high / MAX_BAND[elevation]), SHARPNESS[elevation])
     node, weight = np.polynomial.legendre.leggauss(NODES)
     frequency = (low + high) / 2 + node * (high - low) / 2
     energy = weight * pulse_spectrum(probe, frequency) ** 2
-    return Band(frequency, energy / energy.sum(), grid, _damping(probe.si(), frequency))
+    return Band(frequency, energy / energy.sum(), grid, _damping(probe, frequency))
 
 
 def _maps(band: Band, degree: int, phases: int) -> np.ndarray:

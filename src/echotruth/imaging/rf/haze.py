@@ -14,6 +14,7 @@ import numpy as np
 from echotruth.config import Probe
 from echotruth.config.realism import Haze
 from echotruth.imaging.rf.probe import spectral_width
+from echotruth.units import dB_per_cm_MHz, mm
 
 ECHOES_PER_CELL = 2
 """Later echoes per axial resolution cell: two reproduce the measured speckle statistics of clutter (Byram & Shu)."""
@@ -38,13 +39,13 @@ def reverberation(haze: Haze, probe: Probe, depth: float, random: np.random.Gene
     Shape (echoes, 2): apparent additional depth, m, and amplitude relative to the first echo.
     """
     assert haze.level_dB is not None
-    h, speed = haze.si(), probe.si().sound_speed
-    resolution = speed / 2 * sqrt(2) * log(2) / pi / spectral_width(probe)
-    number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * h.mean_extra_range / resolution)
-    deeper = random.exponential(h.mean_extra_range, number)
-    spread = h.max_source_range / (h.max_source_range + deeper)
+    mean, farthest = haze.mean_extra_range_mm * mm, haze.max_source_range_mm * mm
+    resolution = probe.sound_speed_m_per_s / 2 * sqrt(2) * log(2) / pi / spectral_width(probe)
+    number = ceil(ECHOES_PER_CELL * MAX_LENGTHS * mean / resolution)
+    deeper = random.exponential(mean, number)
+    spread = farthest / (farthest + deeper)
     amplitude = random.standard_normal(number) * 10 ** (haze.level_dB / 20) * spread / np.linalg.norm(spread)
-    return np.column_stack([deeper, amplitude])[deeper < depth - h.max_source_range]
+    return np.column_stack([deeper, amplitude])[deeper < depth - farthest]
 
 
 def reverberation_filter(echoes: np.ndarray, probe: Probe, frequency: np.ndarray) -> np.ndarray:
@@ -53,6 +54,6 @@ def reverberation_filter(echoes: np.ndarray, probe: Probe, frequency: np.ndarray
     They go the additional way through tissue that attenuates by alpha as all tissue does. The first echo is not in it.
     At frequencies (bins,), Hz: shape (bins,), complex.
     """
-    p = probe.si()
+    decay = 2j * np.pi / probe.sound_speed_m_per_s + probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz
     way = np.multiply.outer(frequency, 2 * echoes[:, 0])
-    return (np.exp(-(2j * np.pi / p.sound_speed + p.attenuation) * way) * echoes[:, 1]).sum(axis=1)
+    return (np.exp(-decay * way) * echoes[:, 1]).sum(axis=1)

@@ -8,26 +8,15 @@ import numba
 import numpy as np
 
 from echotruth.imaging.rf.kernel import TAPS
-from echotruth.imaging.rf.product import HEIGHT, padded, product
+from echotruth.imaging.rf.product import HEIGHT, product
 from echotruth.imaging.rf.vectors import fma
 
 QUADRATIC = 3
 """Coefficients of a polynomial of second degree."""
 
 
-def group_blocks(blocks):
-    """Entries (n,) of the same block in groups, -1 where there are too few to fill one: shape (groups, HEIGHT)."""
-    order = np.argsort(blocks, kind="stable")
-    counts = np.bincount(blocks)
-    sizes = padded(counts, HEIGHT)
-    slot = np.arange(len(order)) + np.repeat(np.cumsum(sizes) - sizes - np.cumsum(counts) + counts, counts)
-    groups = np.full(sizes.sum(), -1)
-    groups[slot] = order
-    return groups.reshape(-1, HEIGHT)
-
-
 @numba.njit(nogil=True, cache=True)
-def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
+def lens_kernels(index, angle, lookup, terms, entries, order, tables, part):
     """Make the tables of echoes that a lens has shaped.
 
     Parameters
@@ -46,36 +35,39 @@ def lens_kernels(index, angle, lookup, terms, entries, tables, groups, part):
         the lens and the pair spectrum whose product they are: shape (terms, 4).
     entries
         Blocks to make, shape (entries, 2): scatterer and block.
+    order
+        The entries in the order of their blocks, since the kernels of up to HEIGHT of the same block are made together.
     tables
         Written: shape (entries, phases, rows, TAPS), float32.
-    groups
-        Entries of the same block, as :func:`group_blocks` gives them.
     part
-        First of the groups to be made, and the one after the last.
+        First of the groups of HEIGHT entries in this order that are to be made, and the one after the last.
     """
     responses, pair_spectra, maps = lookup
     nodes, width = pair_spectra.shape[2], tables.shape[1] * TAPS
     spectra, factors = np.empty((HEIGHT, 2, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
-    second, first = np.empty((HEIGHT, QUADRATIC * width), np.float32), np.empty((HEIGHT, 2 * width), np.float32)
-    for group in range(*part):
-        members = 0
-        while members < HEIGHT and groups[group, members] >= 0:
+    quadratic_rows, linear_rows = np.empty((HEIGHT, 3 * width), np.float32), np.empty((HEIGHT, 2 * width), np.float32)
+    looked_up = np.empty((2, 2 * nodes), np.float32)
+    first, stop = HEIGHT * part[0], min(HEIGHT * part[1], len(order))
+    while first < stop:
+        block, members = entries[order[first], 1], 1
+        while members < HEIGHT and first + members < stop and entries[order[first + members], 1] == block:
             members += 1
         # Entry by entry: taking a row apart compiles for longer.
         for n in range(members):
-            lens_spectra(responses, index[entries[groups[group, n], 0]], spectra[n])
-        block, row = entries[groups[group, 0], 1], 0
+            lens_spectra(responses, index[entries[order[first + n], 0]], looked_up, spectra[n])
+        row = 0
         for term in range(len(terms)):
             count, spectrum, pair = terms[term, 1], terms[term, 2], terms[term, 3]
             for n in range(members):
-                k = entries[groups[group, n], 0]
+                k = entries[order[first + n], 0]
                 multiply(spectra[n, spectrum], pair_spectra[angle[k], pair], factors[:, n])
             quadratic = count == QUADRATIC
-            coefficients = second if quadratic else first
+            coefficients = quadratic_rows if quadratic else linear_rows
             product(factors, maps[0][block] if quadratic else maps[1][block], coefficients)
             for n in range(members):
-                write_rows(tables[groups[group, n]], row, count, coefficients[n])
+                write_rows(tables[order[first + n]], row, count, coefficients[n])
             row += count
+        first += members
 
 
 @numba.njit(cache=True)
@@ -96,12 +88,15 @@ def write_rows(table, row, count, coefficients):
 
 
 @numba.njit(cache=True)
-def lens_spectra(responses, index, spectra):
+def lens_spectra(responses, index, looked_up, spectra):
     """Write E^2, and E' E, which is multiplied by the sum of the inverse-range offsets of two elements: (2, 2 nodes).
 
-    E' is the residual of the derivative; both are looked up at a fractional index.
+    E' is the residual of the derivative; both are looked up at a fractional index, and written to `looked_up`, of the
+    same shape.
     """
-    response, slope = interpolate(responses[0], index), interpolate(responses[1], index)
+    response, slope = looked_up[0], looked_up[1]
+    interpolate(responses[0], index, response)
+    interpolate(responses[1], index, slope)
     nodes = len(response) // 2
     for n in range(nodes):
         m = nodes + n
@@ -112,15 +107,13 @@ def lens_spectra(responses, index, spectra):
 
 
 @numba.njit(cache=True)
-def interpolate(table, index):
-    """Bilinear interpolation of a table (rows, columns, n), float32, at a fractional index (row, column): (n,)."""
+def interpolate(table, index, values):
+    """Write values (n,) of a table (rows, columns, n), float32, at a fractional index (row, column): bilinear."""
     row, column = np.int64(index[0]), np.int64(index[1])
     down, right = np.float32(index[0] - row), np.float32(index[1] - column)
     up, left = np.float32(1) - down, np.float32(1) - right
     a, b, c, d = up * left, up * right, down * left, down * right
     first, second = table[row, column], table[row, column + 1]
     third, fourth = table[row + 1, column], table[row + 1, column + 1]
-    values = np.empty(table.shape[2], np.float32)
     for n in range(len(values)):
         values[n] = fma(a, first[n], fma(b, second[n], fma(c, third[n], d * fourth[n])))
-    return values

@@ -8,6 +8,7 @@ from math import log, sqrt
 import numpy as np
 
 from echotruth.config import Probe
+from echotruth.units import MHz, um
 
 SPECTRUM_CUTOFF = 0.01
 """Spectrum of the pulse, relative to its maximum, below which it is cut (-40 dB)."""
@@ -17,8 +18,12 @@ MAX_FREQUENCY = 0.46
 
 def element_centres(probe: Probe) -> np.ndarray:
     """Lateral coordinates of the element centres, shape (elements,), m."""
-    p = probe.si()
-    return (np.arange(p.elements) - (p.elements - 1) / 2) * p.pitch
+    return (np.arange(probe.elements) - (probe.elements - 1) / 2) * (probe.pitch_um * um)
+
+
+def wavelength(probe: Probe) -> float:
+    """Wavelength at the centre frequency, m."""
+    return probe.sound_speed_m_per_s / (probe.frequency_MHz * MHz)
 
 
 def spectral_width(probe: Probe) -> float:
@@ -26,14 +31,13 @@ def spectral_width(probe: Probe) -> float:
 
     The amplitude falls to one half (-6 dB) at half the bandwidth from the centre frequency.
     """
-    return probe.bandwidth * probe.si().frequency / 2 / sqrt(2 * log(2))
+    return probe.bandwidth * (probe.frequency_MHz * MHz) / 2 / sqrt(2 * log(2))
 
 
 def pulse_band(probe: Probe) -> tuple[float, float]:
     """Lowest and highest frequency of the pulse, Hz: where its spectrum is cut off."""
-    p = probe.si()
-    half = spectral_width(probe) * sqrt(-2 * log(SPECTRUM_CUTOFF))
-    return max(p.frequency - half, 0.0), min(p.frequency + half, MAX_FREQUENCY * p.sampling)
+    centre, half = probe.frequency_MHz * MHz, spectral_width(probe) * sqrt(-2 * log(SPECTRUM_CUTOFF))
+    return max(centre - half, 0.0), min(centre + half, MAX_FREQUENCY * (probe.sampling_MHz * MHz))
 
 
 def pulse_spectrum(probe: Probe, frequency: np.ndarray) -> np.ndarray:
@@ -53,5 +57,5 @@ def pulse_spectrum(probe: Probe, frequency: np.ndarray) -> np.ndarray:
     """
     frequency = np.asarray(frequency, float)
     low, high = pulse_band(probe)
-    gaussian = np.exp(-((frequency - probe.si().frequency) ** 2) / (2 * spectral_width(probe) ** 2))
+    gaussian = np.exp(-((frequency - probe.frequency_MHz * MHz) ** 2) / (2 * spectral_width(probe) ** 2))
     return np.where((frequency >= low) & (frequency <= high), gaussian, 0.0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from echotruth.config import Probe
 from echotruth.imaging.rf.probe import element_centres, pulse_spectrum
+from echotruth.units import MHz
 
 THICKNESS = 12
 """Wavelengths from array to face, chosen by eye: 5.4 mm in people, 0.74 mm in mice."""
@@ -19,12 +20,12 @@ ROUND_TRIPS, LOSS_DB = 5, 8.0
 
 def ring_down(probe: Probe, frequency: NDArray[np.float64]) -> NDArray[np.complex64]:
     """Spectra (bins, elements) at even frequencies (bins,), Hz, of what an element hears of one at such a distance."""
-    p, centres = probe.si(), element_centres(probe)
-    trip, delay = np.arange(1, ROUND_TRIPS + 1), 2 * THICKNESS / p.frequency
+    speed, centres = probe.sound_speed_m_per_s, element_centres(probe)
+    trip, delay = np.arange(1, ROUND_TRIPS + 1), 2 * THICKNESS / (probe.frequency_MHz * MHz)
     # What comes after the end of the record would wrap around to its beginning.
     trip = trip[delay * trip < 1 / (frequency[1] - frequency[0])]
-    path = np.hypot(p.sound_speed * delay * trip[:, None], centres - centres[0])
-    wave = np.exp(-2j * np.pi / p.sound_speed * np.multiply.outer(frequency, path))
+    path = np.hypot(speed * delay * trip[:, None], centres - centres[0])
+    wave = np.exp(-2j * np.pi / speed * np.multiply.outer(frequency, path))
     echoes = np.tensordot(wave, 10 ** (-LOSS_DB / 20 * (trip - 1)), (1, 0))
     return (pulse_spectrum(probe, frequency)[:, None] * echoes).astype(np.complex64)
 

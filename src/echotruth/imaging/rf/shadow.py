@@ -12,6 +12,7 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.config.realism import Shadow
+from echotruth.units import deg, mm
 
 MIN_EDGE_WIDTH = 1e-9
 """Width of a sharp edge, m."""
@@ -32,10 +33,10 @@ class Rib:
     """
 
     def __init__(self, shadow: Shadow) -> None:
-        s = shadow.si()
-        self.depth: float = s.depth
+        self.depth = shadow.depth_mm * mm
         self._side = 1 if shadow.side == "right" else -1
-        self._edge, self._edge_width = s.depth * tan(s.edge), max(s.edge_width, MIN_EDGE_WIDTH)
+        self._edge = self.depth * tan(shadow.edge_deg * deg)
+        self._edge_width = max(shadow.edge_width_mm * mm, MIN_EDGE_WIDTH)
         self._floor = np.float32(10 ** (shadow.level_dB / 20))
 
     def projected_edge(self, position: Floats) -> Floats:
