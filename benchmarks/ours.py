@@ -88,7 +88,7 @@ class Ours:
         """Solve the first frames of the loop, its pressure and volume given."""
         clock, whole, everywhere = Clock(), read_loop(Loop()), np.ones(len(self._wall.mesh.cells))
         with clock("cycle"):
-            self._beat = solve(self._heart, _first(whole, frames), everywhere, stiffness)
+            self._beat = solve(self._heart, _first(whole, frames), everywhere, stiffness)[0]
         names = {"tension": "active_tension", "pressure": "pressure", "volume": "volume"}
         course = {name: getattr(self._beat, array).tolist() for name, array in names.items()}
         course |= {"stiffness": float(self._beat.stiffness), "newton_steps": int(self._beat.newton_steps.sum())}

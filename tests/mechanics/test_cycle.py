@@ -28,7 +28,7 @@ def solved(cycle, config=CONFIG, stiffness=None):
     body = wall(config, left_ventricle(config.geometry))
     equations = equilibrium(config, body)
     try:
-        return solve(equations, cycle, body.tissue.tension_scale, stiffness)
+        return solve(equations, cycle, body.tissue.tension_scale, stiffness)[0]
     finally:
         equations.close()
 

@@ -26,6 +26,7 @@ from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.mechanics.solver.circulation import guessed, steady_beat
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solve, solved_cycle
 from echotruth.mechanics.solver.element import fibre_stretch
+from echotruth.mechanics.solver.equilibrium import State
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.unloaded import unload
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
@@ -147,7 +148,7 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     circulation, cycle = calibrate(cycle, settings)
     logger.info("the healthy heart, in its measured loop")
     healthy_wall = unloaded_wall(healthy, cycle)
-    measured, stretch = _healthy_beat(healthy, healthy_wall, cycle)
+    measured, stretch, states = _healthy_beat(healthy, healthy_wall, cycle)
     circulation = altered(circulation.scaled(float(measured.volume[0]) / cycle.edv), settings)
     twitch, cells = settings.contractility * measured.active_tension, unloaded.tissue
     delay, sensitivity = cells.activation_delay / cycle.period, config.mechanics.active.length_sensitivity
@@ -161,34 +162,38 @@ def _circulate(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
     logger.info("the heart in its circulation")
     equations = equilibrium(config, unloaded)
     try:
-        stepper = filled_to_end_diastole(equations, cycle, measured.stiffness)
+        # Where the meshes have the same cells, the healthy heart shows where to look for this one.
+        states = states if len(states[0].solution) == equations.assembly.n_equations else []
+        stepper = filled_to_end_diastole(equations, cycle, measured.stiffness, tuple(states[:1]))
         edv = stepper.load.volume
-        strength = settings.contractility * _strength(unloaded, edv)
-        strength /= _strength(healthy_wall, float(measured.volume[0]))
+        tension = np.array([activation.tension(frame) for frame in range(len(twitch))])
+        borne = _muscle_pressure(unloaded, edv, tension)
+        tension = measured.active_tension[:, None] * healthy_wall.tissue.tension_scale
+        usual = _muscle_pressure(healthy_wall, float(measured.volume[0]), tension)
+        strength = np.divide(borne, usual, out=np.ones(len(twitch)), where=usual > 0)
         guess = guessed(measured, edv, equations.volume(equations.unloaded_state(0.0)), strength)
-        frames = steady_beat(stepper, circulation, guess, activation, settings.beats_max)
+        frames = steady_beat(stepper, circulation, guess, activation, settings.beats_max, states)
         return solved_cycle(equations, replace(cycle, pressure=None, volume=None), frames)
     finally:
         equations.close()
 
 
-def _strength(unloaded: Wall, volume: float) -> float:
-    """Pressure over T_Ca at a volume, m^3, of a wall whose fibres bear alike: ln(1 + V_wall / V) / 3 of their mean
-    (Arts et al., J Biomech 24 (1991) 1131)."""
+def _muscle_pressure(unloaded: Wall, volume: float, tension: Floats) -> Floats:
+    """Pressure (n_frames,), Pa, that the tension (n_frames, n_cells), Pa, of a wall bears at a volume, m^3, if its
+    fibres bear alike: ln(1 + V_wall / V) / 3 of their mean (Arts et al., J Biomech 24 (1991) 1131)."""
     cells = cell_volumes(unloaded.mesh.nodes, unloaded.mesh.cells)
-    mean = np.average(unloaded.tissue.tension_scale, weights=cells)
-    return float(mean * np.log(1 + cells.sum() / volume) / 3)
+    return np.average(tension, axis=1, weights=cells) * np.log(1 + cells.sum() / volume) / 3
 
 
-def _healthy_beat(config: Config, unloaded: Wall, cycle: Cycle) -> tuple[SolvedCycle, Floats]:
-    """A healthy heart in its loop, and the stretch along its fibres since ED, (n_frames, n_cells)."""
+def _healthy_beat(config: Config, unloaded: Wall, cycle: Cycle) -> tuple[SolvedCycle, Floats, list[State]]:
+    """A healthy heart in its loop, the stretch along its fibres since ED, (n_frames, n_cells), and its states."""
     equations, nodes = equilibrium(config, unloaded), unloaded.mesh.nodes
     try:
-        solved = solve(equations, cycle, unloaded.tissue.tension_scale, config.mechanics.material.stiffness)
+        solved, frames = solve(equations, cycle, unloaded.tissue.tension_scale, config.mechanics.material.stiffness)
     finally:
         equations.close()
     stretch = np.array([fibre_stretch(nodes + moved, equations.elements) for moved in solved.displacement])
-    return solved, stretch / stretch[0]
+    return solved, stretch / stretch[0], [frame.state for frame in frames]
 
 
 def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
@@ -197,7 +202,7 @@ def _solve(config: Config, unloaded: Wall, cycle: Cycle) -> SolvedCycle:
         stiffness = _healthy_stiffness(config, cycle)
     equations = equilibrium(config, unloaded)
     try:
-        return solve(equations, cycle, unloaded.tissue.tension_scale, stiffness)
+        return solve(equations, cycle, unloaded.tissue.tension_scale, stiffness)[0]
     finally:
         equations.close()
 

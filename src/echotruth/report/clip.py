@@ -230,7 +230,7 @@ def smaller(frames: np.ndarray, height: int) -> np.ndarray:
     ndarray of shape (frame, height, width, 3), uint8
     """
     size = round(frames.shape[2] * height / frames.shape[1]), height
-    return np.stack([Image.fromarray(frame).resize(size, Image.Resampling.LANCZOS) for frame in frames])
+    return np.stack([np.asarray(Image.fromarray(one).resize(size, Image.Resampling.LANCZOS)) for one in frames])
 
 
 def gif(path: Path, frames: np.ndarray) -> Path:

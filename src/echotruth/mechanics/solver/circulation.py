@@ -2,8 +2,9 @@
 
 The veins alone would take tens of beats to come to rest. So each beat of the finite elements makes an elastance of the
 left ventricle (:func:`elastance`), with which the beat that ends as it began is found among the compartments, in
-milliseconds; the next beat of the finite elements begins there. The elastance goes through the beat
-that it is made from, so that both have the same steady beats; a poor one costs more beats, and changes no result.
+milliseconds; the next beat of the finite elements begins there. The elastance goes through the pressures and volumes of
+the beat that it is made from: a beat of the finite elements that ends as it began does so with its elastance too. So a
+poor elastance costs more beats, and changes no result.
 """
 
 import logging
@@ -46,7 +47,12 @@ DIASTOLIC_EXPONENT = 2.76
 
 
 def steady_beat(
-    stepper: LoadStepper, circulation: Circulation, guess: Cavity, activation: Activation, beats_max: int
+    stepper: LoadStepper,
+    circulation: Circulation,
+    guess: Cavity,
+    activation: Activation,
+    beats_max: int,
+    like: Sequence[State] = (),
 ) -> list[SolvedFrame]:
     """The frames of the first beat that ends as it began: with the same volumes and tension.
 
@@ -62,6 +68,8 @@ def steady_beat(
         A left ventricle like this one.
     activation : Activation
     beats_max : int
+    like : sequence of State
+        The frames of the beat of a like heart, from which the first beat is predicted; empty if there is none.
 
     Returns
     -------
@@ -79,7 +87,7 @@ def steady_beat(
     moved = _distance(circulation, begun, circulation.volumes)
     stepper.tolerance = TOLERANCE if moved < STEADY else ROUGH_TOLERANCE
     frames: list[SolvedFrame] = []
-    states: list[State] = []
+    states = [*like, *like[:1]]
     cavity: Cavity | None = None
     last = np.inf
     for number in range(1, beats_max + 1):
@@ -172,7 +180,7 @@ def _predicted(states: Sequence[State], before: Sequence[State]) -> tuple[State,
     return (linear_combination(earlier, (1, -2, 1, 2, -1)),)
 
 
-def guessed(measured: SolvedCycle, edv: float, unloaded: float, strength: float) -> Cavity:
+def guessed(measured: SolvedCycle, edv: float, unloaded: float, strength: Floats) -> Cavity:
     """A left ventricle like the healthy one in its measured loop.
 
     Parameters
@@ -180,8 +188,8 @@ def guessed(measured: SolvedCycle, edv: float, unloaded: float, strength: float)
     measured : SolvedCycle
     edv, unloaded : float, m^3
         Volumes of this heart at the end-diastolic pressure of the healthy one, and without pressure.
-    strength : float
-        Its pressure over that of the healthy one where its muscle is active.
+    strength : ndarray of shape (n_frames,)
+        Its pressure over that of the healthy one, by the tension of their muscle.
     """
     active = np.clip(4 * measured.active_tension / measured.active_tension.max(), 0, 1)
     pressure = measured.pressure * (1 + (strength - 1) * active)

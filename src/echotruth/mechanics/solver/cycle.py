@@ -97,7 +97,9 @@ class SolvedCycle:
     arterial_pressure: Floats
 
 
-def solve(equations: Equilibrium, cycle: Cycle, tension_scale: Floats, stiffness: float | None = None) -> SolvedCycle:
+def solve(
+    equations: Equilibrium, cycle: Cycle, tension_scale: Floats, stiffness: float | None = None
+) -> tuple[SolvedCycle, list[SolvedFrame]]:
     """Drive a heart through a cycle.
 
     Parameters
@@ -112,7 +114,9 @@ def solve(equations: Equilibrium, cycle: Cycle, tension_scale: Floats, stiffness
 
     Returns
     -------
-    SolvedCycle
+    solved : SolvedCycle
+    frames : list of SolvedFrame
+        From which it is made.
 
     Raises
     ------
@@ -122,10 +126,13 @@ def solve(equations: Equilibrium, cycle: Cycle, tension_scale: Floats, stiffness
     stepper = filled_to_end_diastole(equations, cycle, stiffness)
     if stiffness is not None and cycle.prescribed == "pressure_volume":
         cycle = cycle.scaled(stepper.load.volume / cycle.edv)
-    return solved_cycle(equations, cycle, list(solved_frames(stepper, cycle, tension_scale)))
+    frames = list(solved_frames(stepper, cycle, tension_scale))
+    return solved_cycle(equations, cycle, frames), frames
 
 
-def filled_to_end_diastole(equations: Equilibrium, cycle: Cycle, stiffness: float | None = None) -> LoadStepper:
+def filled_to_end_diastole(
+    equations: Equilibrium, cycle: Cycle, stiffness: float | None = None, predictors: tuple[State, ...] = ()
+) -> LoadStepper:
     """Fill the passive heart to end-diastole.
 
     Parameters
@@ -134,6 +141,8 @@ def filled_to_end_diastole(equations: Equilibrium, cycle: Cycle, stiffness: floa
     cycle : Cycle
     stiffness : float, optional, Pa
         C. If not given, it is solved from the end-diastolic pressure and volume.
+    predictors : tuple of State
+        States of end-diastole of like hearts, from which a heart that fills to a pressure may start.
 
     Returns
     -------
@@ -149,20 +158,23 @@ def filled_to_end_diastole(equations: Equilibrium, cycle: Cycle, stiffness: floa
     if cycle.pressure is None:
         stepper.advance(Load(0.0, cycle.edv, 0.0), "cavity_pressure")
     else:
-        _fill_to_pressure(stepper, cycle, float(cycle.pressure[0]), stiffness)
+        _fill_to_pressure(stepper, cycle, stiffness, predictors)
     stepper.rest()
     return stepper
 
 
-def _fill_to_pressure(stepper: LoadStepper, cycle: Cycle, pressure: float, stiffness: float | None) -> None:
-    unloaded_volume = stepper.load.volume
+def _fill_to_pressure(
+    stepper: LoadStepper, cycle: Cycle, stiffness: float | None, predictors: tuple[State, ...]
+) -> None:
+    assert cycle.pressure is not None
+    unloaded_volume, pressure = stepper.load.volume, float(cycle.pressure[0])
     if stiffness is None and cycle.edv <= unloaded_volume:
         least = LEAST_FILLING * unloaded_volume
         volumes = f"{cycle.edv * 1e9:.3g} uL at end-diastole, and the unloaded cavity {unloaded_volume * 1e9:.3g} uL"
         shrunk = (cycle.edv / least) ** (1 / 3)
         remedy = f"give loop.edv_uL of {least * 1e9:.3g} or more, or {shrunk:.3g} of this geometry.scale or less"
         raise Diverged(f"the loop has {volumes}: {remedy}.")
-    stepper.advance(Load(pressure, 1.0, 0.0), None)
+    stepper.advance(Load(pressure, 1.0, 0.0), None, predictors)
     logger.info("filled to %.4g uL with C = %.4g kPa", stepper.load.volume * 1e9, stepper.state.stiffness / 1e3)
     if stiffness is None:
         state = stepper.advance(Load(pressure, cycle.edv, 0.0), "stiffness")

@@ -2,7 +2,9 @@
 
 With F the residual of a state x and J the factored tangent, a correction solves J dx = -F(x). The step x + d dx, with
 damping d, is taken if the correction after it, J dx' = -F(x + d dx), has |dx'| < (1 - d / 4) |dx| (natural monotonicity
-test; Deuflhard, Newton Methods for Nonlinear Problems, section 3.3); if not, d is halved. Factors are
+test; Deuflhard, Newton Methods for Nonlinear Problems, section 3.3); if not, d is halved. At rest it is also taken if
+the relative residual falls by that factor: as the wall fills and stiffens, the first test alone refuses steps that lead
+to the solution. With velocities it stands alone, because the result depends on which steps are halved. Factors are
 reused, also from frame to frame, with Broyden's updates, as long as the remaining corrections cost less than new
 factors. Load steps are halved where Newton's method fails.
 """
@@ -221,7 +223,7 @@ class LoadStepper:
         """Corrections with one factorization, the last or a new one."""
         fresh = self._tangent is None
         tangent = self._tangent or self._factor(state, load, unknown)
-        corrections, damping = [tangent.correction(residual)], 1.0
+        corrections, damping, rests = [tangent.correction(residual)], 1.0, load.time == self.load.time
         while True:
             last = corrections[-1]
             trial = state.corrected(last, damping, unknown)
@@ -232,7 +234,9 @@ class LoadStepper:
             simplified = _broyden_update(tangent.correction(after), corrections) if finite else None
             ratio = simplified.norm / last.norm if simplified else np.inf
             keep_factors = self._keeps_factors(ratio, after)
-            if simplified and ratio < 1 - damping / 4 and (fresh or keep_factors):
+            least = 1 - damping / 4
+            nearer = ratio < least or (rests and after.total_error < least * residual.total_error)
+            if simplified and nearer and (fresh or keep_factors):
                 if damping < 1 or not keep_factors:
                     self._tangent = None
                     return trial, after
