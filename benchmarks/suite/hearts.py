@@ -79,7 +79,8 @@ SUBSET_MM = 1.0
 
 FILES = (
     *(Path(__file__).parent / f"{name}.py" for name in ("hearts", "scores", "columns")),
-    PACKAGE / "config/diagnosis.py",
+    *(PACKAGE / f"config/{name}" for name in ("diagnosis.py", "bounds.csv")),
+    Path(__file__).parents[2] / "examples/affine_dic.py",
 )
 """Files on which the numbers depend, beside those that the version of a view counts."""
 

@@ -14,6 +14,7 @@ from finished_repository import configured
 from echotruth.cases import expand
 from echotruth.config import Config, shipped
 from echotruth.config.loading import load
+from echotruth.config.pathology import SCARS, Infarct, Pathology
 from echotruth.repository.code import PACKAGE, _hash, code_hash, files_of, imported
 from echotruth.repository.version import BEFORE, motion_hash, packages, version_of
 
@@ -118,6 +119,13 @@ def test_data_of_a_module_count_as_it_does():
     assert "bspline_cnn.npz" in {
         file.name for file in files_of("tracking", ["echotruth.tracking.trackers.bspline_cnn"])
     }
+
+
+def test_other_stiffness_of_an_old_scar_is_another_version(monkeypatch):
+    config = configured(pathology=Pathology(infarct=Infarct(segments=[7], age="old")))
+    before = version_of("mechanics", config)
+    monkeypatch.setitem(SCARS, "old", SCARS["old"] | {"stiffness_scale": 6.0})
+    assert version_of("mechanics", config) != before
 
 
 IMAGES = {"bmode", "tracking"}

@@ -162,7 +162,7 @@ def _motion(config: Config) -> Settings:
     """What the motion of a heart depends on, besides the content of the files that it names."""
     # Only fibre disarray depends on the seed.
     seed = config.seed if config.fibres.disarray_deg else None
-    anatomy = (config.geometry.resolved(), config.fibres, seed, config.pathology)
+    anatomy = (config.geometry.resolved(), config.fibres, seed, config.pathology.resolved())
     if config.motion.kind == "beat":
         return (*anatomy, config.loop, config.mechanics)
     formula = getattr(config.motion, config.motion.kind)

@@ -7,7 +7,6 @@ function, and writes groups. A group is moved to its place when it is whole; a j
 import argparse
 import json
 import logging
-import os
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
@@ -229,14 +228,14 @@ def run(job: Job, work: Work) -> None:
 
 
 def _prepare(threads: int, place: str) -> None:
-    """Give the log the name of a job, and its number of threads to Numba if the stage has compiled functions."""
-    if sys.modules.get("numba"):
-        import numba
+    """Give the log the name of a job, and its number of threads to Numba.
 
-        guard_cache()
-        numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
-    else:
-        os.environ["NUMBA_NUM_THREADS"] = str(threads)  # of a tracker, whose module is imported when it is called
+    Numba is loaded here for all stages: a tracker may compile functions that no module of its stage imports before.
+    """
+    import numba
+
+    guard_cache()
+    numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
     logging.getLogger("numba").setLevel(logging.WARNING)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
 
