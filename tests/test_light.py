@@ -4,6 +4,7 @@ The packages of the extra are absent for a process in which their names stand fo
 """
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -110,6 +111,21 @@ def test_command_that_needs_more_says_which_extra_in_one_line(tmp_path):
     said[-2] = f"echotruth: the tracker dis {WHOLE.format('cv2')}"
     said[-1] = f"echotruth: a.onnx needs the package onnxruntime: {installation('onnx')}"
     assert (done.returncode, done.stderr.splitlines()) == (0, said)
+
+
+def test_job_scores_a_tracker_of_ones_own_in_the_light_installation(tmp_path):
+    shutil.copytree(et.sample().folder, tmp_path / "copy")
+    (tmp_path / "absent").mkdir()
+    for name in MAKE:  # also for the process of the job
+        (tmp_path / f"absent/{name}.py").write_text(f"raise ModuleNotFoundError('no {name}', name='{name}')\n")
+    still = "def track(frames, points, *rest):\n    return np.zeros((len(frames), len(points), 2))\n"
+    (tmp_path / "still.py").write_text(f"import numpy as np\n\n\n{still}")
+    paths = os.pathsep.join([str(tmp_path / "absent"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    chosen = ["evaluate", "copy", "--tracker", "still:track", "--case", "healthy", "--view", "mid"]
+    command, environment = [sys.executable, "-m", "echotruth", *chosen], os.environ | {"PYTHONPATH": paths}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "still is a tracker of" in done.stdout
 
 
 def test_functions_that_need_more_say_which_extra(tmp_path):

@@ -94,6 +94,12 @@ def test_end_of_snakemake_is_told_by_its_status(tmp_path, monkeypatch, status, l
     assert (found, output) == (status, "") and errors.splitlines()[-1] == last
 
 
+def test_run_that_makes_no_report_names_the_output_of_snakemake(tmp_path, monkeypatch):
+    monkeypatch.setattr("echotruth.workflow.run.execute", lambda *_: 0)
+    status, output, _ = run_cli("run", ROOT / "config/demo.yaml", "repository", cwd=tmp_path)
+    assert (status, output) == (0, "No report yet; what Snakemake said is in out/demo/logs/snakemake.log\n")
+
+
 def test_run_whose_hearts_all_fail_has_a_status_of_its_own(tmp_path, monkeypatch):
     def execute(*_):
         finish(tmp_path / "out/small", config, fail)

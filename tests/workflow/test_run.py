@@ -113,7 +113,16 @@ def test_missing_package_of_the_executor_of_a_profile_is_named_with_its_remedy(t
     with chdir(tmp_path):
         error = problem(parsed("--profile", "mine"))
         assert error.endswith(remedy) and "pip install" in error
+        assert problem(parsed("--profile", "mine", "--estimate")) == ""
         assert problem(parsed()) == ""
+
+
+@pytest.mark.parametrize("content", [b"jobs: [1", b"jobs: \xff"])
+def test_profile_that_is_no_yaml_is_refused_with_its_file(tmp_path, content):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/config.yaml").write_bytes(content)
+    with chdir(tmp_path), pytest.raises(ValueError, match=r"^mine/config.yaml: is no YAML .* correct it"):
+        problem(parsed("--profile", "mine"))
 
 
 def test_targets_come_after_all_options_since_snakemake_takes_them_for_configurations():

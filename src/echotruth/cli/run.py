@@ -114,6 +114,7 @@ def _make(arguments: argparse.Namespace, config: Config, cases: list[Case]) -> i
         )
         return status
     if not (folder / "report.html").is_file():  # only a part was asked for
+        print(f"No report yet; what Snakemake said is in {folder / 'logs/snakemake.log'}")
         return 0
     found, spent = status_of(folder), sum(os.times()[2:4])
     print("\n".join(verdicts(found)))

@@ -72,7 +72,7 @@ def problem(arguments: argparse.Namespace) -> str:
         if option.partition("=")[0] in CONFIG_OPTIONS:
             return f"{option}: change the file of the configuration"
     executor = _content(arguments.profile).get("executor")
-    if not isinstance(executor, str) or executor in OWN_EXECUTORS:
+    if arguments.estimate or not isinstance(executor, str) or executor in OWN_EXECUTORS:
         return ""
     package = f"snakemake-executor-plugin-{executor}"
     if find_spec(package.replace("-", "_")) is not None:
@@ -116,6 +116,10 @@ def _content(profiles: list[tuple[str, str]]) -> dict[str, object]:
     """Content of the first profile that is a folder; empty without one."""
     for _, folder in profiles:
         if (file := Path(folder) / "config.yaml").is_file():
-            content = yaml.safe_load(file.read_text(encoding="utf-8"))
+            try:
+                content = yaml.safe_load(file.read_text(encoding="utf-8"))
+            except (yaml.YAMLError, ValueError) as error:
+                remedy = "correct it, or give another --profile"
+                raise ValueError(f"{file}: is no YAML ({' '.join(str(error).split())}): {remedy}") from None
             return content if isinstance(content, dict) else {}
     return {}

@@ -44,7 +44,7 @@ def check_clip(clip: object, name: str = "clip") -> None:
 def check_whole(clip: xr.Dataset, config: Config) -> None:
     """Check that a clip has all frames and pixels of its image, in their order.
 
-    Trackers are given one spacing and of a wall at end-diastole, so that of a clip that was cropped, reversed or
+    Trackers are given one spacing and the wall at end-diastole, so that in a clip that was cropped, reversed or
     resampled they would find another motion.
 
     Parameters

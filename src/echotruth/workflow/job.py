@@ -9,6 +9,7 @@ import json
 import logging
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -232,10 +233,11 @@ def _prepare(threads: int, place: str) -> None:
 
     Numba is loaded here for all stages: a tracker may compile functions that no module of its stage imports before.
     """
-    import numba
+    with suppress(ModuleNotFoundError):  # an installation without the extra make runs trackers that need no Numba
+        import numba
 
-    guard_cache()
-    numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
+        guard_cache()
+        numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
     logging.getLogger("numba").setLevel(logging.WARNING)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
 
