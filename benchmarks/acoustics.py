@@ -1,4 +1,4 @@
-"""RF against PyMUST and eSDIva, in one run: `python benchmarks/acoustics.py --peers PYTHON`.
+"""RF against PyMUST, eSDIva, zea and FastSIMUS, in one run: `python benchmarks/acoustics.py --peers PYTHON`.
 
 Where two are compared they take turns in one process on one thread, and medians of CPU time are reported.
 """
@@ -24,6 +24,7 @@ Result = dict[str, Any]
 MOUSE, HUMAN = "mouse, 25 MHz", "human, 2.72 MHz"
 
 SPEED = {
+    "ours, few scatterers": 1000,
     "ours": 20000,
     "ours, elevation": 20000,
     "PyMUST": 1000,
@@ -33,6 +34,10 @@ SPEED = {
     "eSDIva": 2000,
     "eSDIva, elevation": 1000,
     "eSDIva, matrix": 200,
+    "zea": 200,
+    "zea in time": 1000,
+    "FastSIMUS": 1000,
+    "FastSIMUS as it comes": 2000,
 }
 """Party to the scatterers of a turn."""
 THICK = ("ours, elevation", "PyMUST, elevation", "PyMUST as it comes, elevation", "eSDIva, elevation")
@@ -67,7 +72,7 @@ SCANS: dict[str, tuple[int, dict[str, Any]]] = {
 }
 """Scans of a frame: how many transmits, and how ours are made."""
 OURS = {"ours": {"elevation_beam": False}, "ours, elevation": {}}
-PEERS = tuple(party for party in SPEED if party not in (*OURS, "eSDIva, matrix"))
+PEERS = tuple(party for party in SPEED if not party.startswith("ours") and party != "eSDIva, matrix")
 LENGTHS = (32, 64, 128, 256)
 """Elements of the arrays of which whole frames are made."""
 
@@ -85,7 +90,7 @@ class Bench:
     Attributes
     ----------
     python : str
-        Interpreter that has echotruth, PyMUST and eSDIva.
+        Interpreter that has echotruth and its peers.
     repeats : int
         Turns of each party.
     """
@@ -99,7 +104,7 @@ class Bench:
 
 
 def speed(bench: Bench) -> Result:
-    """Seconds of a turn of every party before both arrays."""
+    """Seconds of a turn of every party before both arrays, and the errors."""
     answer = {}
     with bench.side() as side:
         for array in (MOUSE, HUMAN):
@@ -109,7 +114,7 @@ def speed(bench: Bench) -> Result:
                     given = {"array": array, "scatterers": scatterers, "thick": party in THICK}
                     spent[party].append(side("turn", party=party, **given))
             rows = {party: _medians(taken) | {"scatterers": SPEED[party]} for party, taken in spent.items()}
-            answer[array] = rows
+            answer[array] = {"turns": rows, "errors": side("errors", array=array)}
             _tell(f"{array}: " + ", ".join(f"{n} {1e6 * r['cpu'] / r['scatterers']:.2f} us" for n, r in rows.items()))
     return answer
 
@@ -180,7 +185,7 @@ def frame(bench: Bench) -> Result:
 
 
 def scans(bench: Bench) -> Result:
-    """Seconds of a B-mode frame by the scan: ours from scatterers to uint8, the peers' RF alone; and the errors."""
+    """Seconds of a B-mode frame by the scan: ours from scatterers to uint8, the peers' RF alone."""
     answer: Result = {"scatterers": IMAGED, "transmits": {name: number for name, (number, _) in SCANS.items()}}
     with bench.side() as side:
         for array in (MOUSE, HUMAN):
@@ -198,7 +203,7 @@ def scans(bench: Bench) -> Result:
             rows = {party: {name: median(ours[party, name]) for name in SCANS} for party in OURS}
             for party in PEERS:
                 rows[party] = {name: number * median(peers[party]) for name, (number, _) in SCANS.items()}
-            answer[array] = {"seconds": rows, "errors": side("errors", array=array)}
+            answer[array] = rows
             _tell(f"{array}: {answer[array]}")
     return answer
 
@@ -262,7 +267,7 @@ def _tell(line: str) -> None:
 def main() -> None:
     """Run parts of the benchmark, and bring the report up to date."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--peers", default=sys.executable, help="Python interpreter that has the extra peers")
+    parser.add_argument("--peers", default=sys.executable, help="Python interpreter that has the peers")
     parser.add_argument("--parts", nargs="+", choices=list(PARTS), default=list(PARTS))
     parser.add_argument("--repeats", type=int, default=5, help="turns of each party")
     parser.add_argument("--results", type=Path, default=HERE / "results")

@@ -67,34 +67,19 @@ LOOPS = {"load": (load, 2), "store": (store, 2), "multiply": (multiply, HORNER)}
 """Name to loop and how often it does that to every number."""
 
 
-def counts(scheme: int) -> dict[str, dict[str, int]]:
-    """Bytes and instructions of spreading an echo, a vector of eight at a time.
+def traffic(scheme: int) -> dict[str, int]:
+    """Bytes of spreading an echo, a vector of eight at a time.
 
     Loads of every row of its table, of the trace, and of time, weight and spectral exponent of the receiver; a store of
-    the trace;
-    as many multiply-adds as the table has rows.
+    the trace; as many multiply-adds as the table has rows.
     """
     rows = sum(spreading.COEFFICIENTS[scheme])
-    return {
-        "load": {"bytes": (rows + 1) * 32 + 3 * 4, "instructions": rows + 1 + 3},
-        "store": {"bytes": 32, "instructions": 1},
-        "multiply": {"bytes": rows * 32, "instructions": rows},
-    }
+    return {"load": (rows + 1) * 32 + 3 * 4, "store": 32, "multiply": rows * 32}
 
 
-def rates() -> dict[str, dict[str, float]]:
-    """Nanoseconds of CPU for 32 bytes and for an instruction, of the widest vectors of the machine, by kind."""
-    answer = {}
-    for name, (loop, each) in LOOPS.items():
-        number = nanoseconds(loop) / LENGTH / each
-        answer[name] = {"vector": VECTOR * number, "instruction": lanes(loop) * number}
-    return answer
-
-
-def lanes(loop: Callable[..., Any]) -> int:
-    """Numbers that an instruction of a compiled loop works on."""
-    assembly = "".join(loop.inspect_asm().values())
-    return next((lanes for register, lanes in (("%zmm", 16), ("%ymm", 8)) if register in assembly), 4)
+def rates() -> dict[str, float]:
+    """Nanoseconds of CPU for 32 bytes, by kind."""
+    return {name: VECTOR * nanoseconds(loop) / LENGTH / each for name, (loop, each) in LOOPS.items()}
 
 
 def nanoseconds(loop: Callable[..., Any]) -> float:

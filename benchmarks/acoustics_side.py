@@ -15,7 +15,7 @@ import acoustics_exact
 import acoustics_floor
 import acoustics_frame
 from acoustics_arrays import ARRAYS, Array, Floats, delays
-from acoustics_peers import PATCHES, Esdiva, Pymust
+from acoustics_peers import PATCHES, Esdiva, FastSimus, Pymust, Zea
 from worker import Clock, serve
 
 from echotruth.imaging.rf.full_matrix import FullMatrix
@@ -27,19 +27,15 @@ ELEMENTS = 64
 PAIRED, TURNS = (20000, 60000), 5
 """Scatterers of the turns whose difference gives the cost of a pair."""
 
-WARMING = 250
-"""Scatterers of the turn that is not counted, for what is compiled or set up once; eSDIva bins from 200 on."""
-
 
 def matrix(array: Array, elements: int, **options: Any) -> Run:
     """Ours: all elements to all elements."""
     return FullMatrix(array.probe(elements=elements), array.far, **options)
 
 
-def pymust(array: Array, elements: int, elevation: bool = False, **options: Any) -> Run:
-    """One focused transmit of PyMUST."""
-    probe = array.probe(elements=elements)
-    side, delay = Pymust(probe, elevation=elevation, **options), _focused(array, elements)
+def transmit(array: Array, elements: int, peer: Callable[..., Any], **options: Any) -> Run:
+    """One focused transmit of a peer."""
+    side, delay = peer(array.probe(elements=elements), **options), _focused(array, elements)
     return lambda position, amplitude: side(position, amplitude, delay)
 
 
@@ -64,32 +60,39 @@ def _focused(array: Array, elements: int) -> Floats:
     return delays(probe, (0.0, probe.elevation_focus_mm * mm))
 
 
+PYMUST = {"peer": Pymust}
+
 PARTIES: dict[str, tuple[Callable[..., Run], dict[str, Any]]] = {
+    "ours, few scatterers": (matrix, {"elevation": False}),
     "ours": (matrix, {"elevation": False}),
     "ours, elevation": (matrix, {"elevation": True}),
-    "PyMUST": (pymust, acoustics_agreement.FINE),
-    "PyMUST, elevation": (pymust, acoustics_agreement.FINE | {"elevation": True}),
-    "PyMUST as it comes": (pymust, {}),
-    "PyMUST as it comes, elevation": (pymust, {"elevation": True}),
+    "PyMUST": (transmit, PYMUST | acoustics_agreement.FINE),
+    "PyMUST, elevation": (transmit, PYMUST | acoustics_agreement.FINE | {"elevation": True}),
+    "PyMUST as it comes": (transmit, PYMUST),
+    "PyMUST as it comes, elevation": (transmit, PYMUST | {"elevation": True}),
     "eSDIva": (esdiva, {}),
     "eSDIva, elevation": (esdiva, {"patches": PATCHES}),
     "eSDIva, matrix": (esdiva_matrix, {}),
+    "zea": (transmit, {"peer": Zea}),
+    "zea in time": (transmit, {"peer": Zea, "in_time": True}),
+    "FastSIMUS": (transmit, {"peer": FastSimus, "fine": True}),
+    "FastSIMUS as it comes": (transmit, {"peer": FastSimus}),
 }
 """Party to what makes it, and its options."""
 
 
 @cache
-def ready(party: str, array: str, elements: int, thick: bool) -> Run:
-    """A party that has taken a turn."""
+def ready(party: str, array: str, scatterers: int, elements: int, thick: bool) -> Run:
+    """A party that has taken a turn with these scatterers, as JAX compiles for every number of them."""
     make, options = PARTIES[party]
     run = make(ARRAYS[array], elements, **options)
-    run(*ARRAYS[array].scatterers(WARMING, thick=thick))
+    run(*ARRAYS[array].scatterers(scatterers, thick=thick))
     return run
 
 
 def turn(party: str, array: str, scatterers: int, elements: int = ELEMENTS, thick: bool = False) -> dict[str, float]:
     """Wall and CPU seconds of a turn."""
-    run, clock = ready(party, array, elements, thick), Clock()
+    run, clock = ready(party, array, scatterers, elements, thick), Clock()
     phantom = ARRAYS[array].scatterers(scatterers, thick=thick)
     with clock("turn"):
         run(*phantom)
@@ -97,11 +100,12 @@ def turn(party: str, array: str, scatterers: int, elements: int = ELEMENTS, thic
 
 
 def pair(party: str, array: str) -> dict[str, Any]:
-    """Nanoseconds of CPU of a pair of elements and a scatterer (what more scatterers add), and its least work."""
+    """Nanoseconds of CPU of a pair of elements and a scatterer (what more scatterers add), its least work, and bins."""
     spent = [[turn(party, array, number)["cpu"] for number in PAIRED] for _ in range(TURNS)]
     few, many = (median(turns) for turns in zip(*spent, strict=True))
     taken = 1e9 * (many - few) / (PAIRED[1] - PAIRED[0]) / (ELEMENTS * (ELEMENTS + 1) / 2)
-    return {"ns": taken, "counts": acoustics_floor.counts(acoustics_floor.SCHEMES[party])}
+    bins = len(FullMatrix(ARRAYS[array].probe(elements=ELEMENTS), ARRAYS[array].far).frequency)
+    return {"ns": taken, "bytes": acoustics_floor.traffic(acoustics_floor.SCHEMES[party]), "bins": bins}
 
 
 def peak() -> float:
@@ -112,7 +116,8 @@ def peak() -> float:
 
 def versions() -> dict[str, str]:
     """Versions of all packages that are compared."""
-    return {name: version(name) for name in ("echotruth", "PyMUST", "esdiva", "numba", "numpy", "scipy")}
+    packages = ("echotruth", "PyMUST", "esdiva", "zea", "FastSIMUS", "jax", "numba", "numpy", "scipy")
+    return {name: version(name) for name in packages}
 
 
 if __name__ == "__main__":

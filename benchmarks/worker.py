@@ -24,7 +24,7 @@ ONE_THREAD = {
         "NUMBA_NUM_THREADS",
         "BLIS_NUM_THREADS",
     )
-}
+} | {"XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
 """What keeps every library of both sides on one thread."""
 
 

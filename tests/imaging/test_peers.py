@@ -1,4 +1,7 @@
-"""The RF against other simulators, where they are installed: `pip install -e .[peers]`."""
+"""The RF, and the sum that it is measured by, against other simulators where they are installed.
+
+`pip install -e .[peers,zea] FastSIMUS` installs them.
+"""
 
 from pathlib import Path
 
@@ -14,6 +17,13 @@ def agreement(monkeypatch):
     import acoustics_agreement
 
     return acoustics_agreement
+
+
+@pytest.fixture
+def exact(agreement):
+    import acoustics_exact
+
+    return acoustics_exact
 
 
 @pytest.mark.parametrize("array", ARRAYS)
@@ -40,3 +50,18 @@ def test_the_matrix_is_that_of_esdiva(agreement, array):
     assert found["correlation"] > 0.9999999
     assert found["error"] < 2e-4
     assert found["factor"] == pytest.approx(1, rel=1e-3)
+
+
+@pytest.mark.parametrize("array", ARRAYS)
+def test_the_exact_sum_is_that_of_zea_but_for_the_baffle(exact, array):
+    pytest.importorskip("zea")
+    assert exact.transmit(exact.Zea, exact.ARRAYS[array], law=exact.rigid_baffle) < 2e-4
+    assert exact.transmit(exact.Zea, exact.ARRAYS[array]) > 1e-2
+
+
+@pytest.mark.parametrize("array", ARRAYS)
+def test_the_exact_sum_is_that_of_fastsimus_but_for_the_loss_over_distance(exact, array):
+    pytest.importorskip("fast_simus")
+    options = {"fine": True, "widest": True}
+    assert exact.transmit(exact.FastSimus, exact.ARRAYS[array], law=exact.two_dimensions, **options) < 2e-4
+    assert exact.transmit(exact.FastSimus, exact.ARRAYS[array], **options) > 1e-1
