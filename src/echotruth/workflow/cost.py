@@ -5,11 +5,11 @@ from math import ceil
 from echotruth.config import Config
 
 SECONDS = {
-    **{"mechanics": 60, "phantom": 2, "rf": 45, "truth": 12, "bmode": 4, "points": 2, "tracking": 12, "inference": 90},
-    **{"repository": 3, "report": 12},
+    **{"mechanics": 60, "phantom": 4, "rf": 36, "truth": 17, "bmode": 4, "points": 4, "tracking": 9, "inference": 90},
+    **{"repository": 1, "report": 22},
 }
-"""CPU time of a job of each rule for the default heart (40 frames, 512 px), s, on a core of an Intel Xeon (model 167);
-of tracking, that of a tracker in three sizes."""
+"""CPU time of a job of each rule for the default heart (40 frames, 512 px), s, on a core of an AMD EPYC (Zen 4); of
+tracking, that of a tracker in three sizes."""
 MEGABYTES = {
     **{
         "mechanics": 900,
@@ -110,7 +110,7 @@ def table(config: Config, hearts: int, cases: int, cores: int) -> str:
     number = hearts * FILES_OF_HEART + views * of_view
     took = max(total / cores, chain(config))
     lines += ["", f"Time: {duration(total)} of CPU time, about {duration(took)} on {cores} cores"]
-    lines += [f"Disk: {disk}, about {number} files", "Based on the default heart on a core of an Intel Xeon"]
+    lines += [f"Disk: {disk}, about {number} files", "Based on the default heart on a core of an AMD EPYC"]
     return "\n".join(lines)
 
 
