@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -61,6 +63,16 @@ def test_animations_and_video(made, strain, tmp_path):
     assert Image.open(clip.webp(tmp_path / "clip.webp", frames)).n_frames == 4
     video = clip.mp4(tmp_path / "clip.mp4", frames).read_bytes()
     assert video[4:8] == b"ftyp" and len(video) > 1000
+
+
+def test_video_has_the_same_bytes_on_one_core(tmp_path):
+    frames, cores = np.random.default_rng(0).integers(0, 255, (6, 300, 690, 3), np.uint8), os.sched_getaffinity(0)
+    expected = clip.mp4(tmp_path / "many.mp4", frames).read_bytes()
+    os.sched_setaffinity(0, {min(cores)})
+    try:
+        assert clip.mp4(tmp_path / "one.mp4", frames).read_bytes() == expected
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 def test_gif_shows_what_its_frames_show(made, strain, tmp_path):

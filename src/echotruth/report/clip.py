@@ -297,7 +297,8 @@ def mp4(path: Path, frames: np.ndarray) -> Path:
         codec="libx264",
         quality=6,
         macro_block_size=2,
-        output_params=["-preset", "veryfast"],  # half the time of the default for 2 % more bytes
+        # Half the time of the default for 2 % more bytes; one thread, as the bytes depend on their number.
+        output_params=["-preset", "veryfast", "-threads", "1"],
     )
     video.send(None)
     for frame in np.concatenate([frames] * BEATS):
