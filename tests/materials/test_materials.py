@@ -85,6 +85,19 @@ def test_nothing_is_stressed_by_a_change_of_volume_or_at_rest(name):
         np.testing.assert_allclose(stress, 0, atol=1e-13)
 
 
+@pytest.mark.parametrize("name", LAWS)
+def test_stiffness_is_the_second_derivative_of_the_energy_summed_over_all_strains(name):
+    def summed(name):
+        c = np.array([1.21, 1 / 1.1, 1 / 1.1, 0, 0, 0])
+        steps = 1e-6 * np.eye(6)
+        # Each shear stands twice in C: dS_fs / dC_fs is 2 dS_fs / (2 dE_fs).
+        return sum((complex_step(c + d, name)[k] - complex_step(c - d, name)[k]) / 1e-6 for k, d in enumerate(steps))
+
+    law = LAWS[name]
+    found = material.relative_stiffness(law.energy, law.Law().constants())
+    assert found == pytest.approx(summed(name) / summed("fung"), rel=1e-6)
+
+
 def pull(c, name):
     """Cauchy stress along f less that along n of a stretch without shear, of an incompressible wall."""
     _, stress, _ = respond(c, name)

@@ -6,6 +6,7 @@ import pytest
 
 from echotruth.config import Config, Fibres, Geometry, Loop, Mechanics
 from echotruth.heart import Heart
+from echotruth.materials import LAWS
 from echotruth.mechanics import fibres
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics, fibre_angles
@@ -68,6 +69,13 @@ def test_wall_keeps_its_volume(case):
     kinematics = case["kinematics"]
     assert kinematics["volume_ratio_min"].min() > 0
     assert np.abs(kinematics["volume_ratio_mean"] - 1).max() < 0.02
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_points_of_the_wall_keep_their_volume_at_end_systole_by_every_law(law):
+    config = Config(geometry=COARSE, loop=Loop(frames=8), mechanics=Mechanics(material={"law": law}))
+    arrays = beat(config, frames=(0, 1, 2, 3))
+    assert arrays["kinematics"]["volume_change_rms"][arrays["mechanics"]["es_frame"]] < 0.03
 
 
 def test_angles_read_back_are_those_asked_for(case):

@@ -13,7 +13,7 @@ from echotruth.loop.cycle import heart_cycle, read_loop
 from echotruth.mechanics.beat import beat
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
-from echotruth.mechanics.solver.cycle import solve
+from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solve
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
 
@@ -115,6 +115,14 @@ def unloaded_volume(config):
         equations.close()
 
 
+def filled(config):
+    equations = equilibrium(config, wall(config, left_ventricle(config.geometry)))
+    try:
+        return filled_to_end_diastole(equations, heart_cycle(config))
+    finally:
+        equations.close()
+
+
 def refusal(config):
     with pytest.raises(Diverged) as refused:
         beat(config)
@@ -128,6 +136,14 @@ def test_heart_that_cannot_be_filled_is_told_a_volume_and_a_size_that_work():
     assert "geometry.scale = 1.3 (0.88 to 1.12)" in told
     for remedy in ({"loop.edv_uL": volume}, {"geometry.scale": 1.3 * factor}):
         beat(configure(small, **remedy))
+
+
+def test_wall_of_rubber_is_filled_and_one_too_soft_for_the_pressure_is_told_so():
+    """Rubber gives way at a pressure in proportion to C, which in the human is above where the search for C starts."""
+    rubber = configure(CONFIG, geometry={"preset": "human"}, mechanics={"material": {"law": "neo_hooke"}})
+    assert filled(rubber).load.volume == pytest.approx(heart_cycle(rubber).edv, rel=1e-7)
+    told = refusal(configure(rubber, mechanics={"material": {"stiffness_kPa": 1.0}}))
+    assert "C = 1 kPa does not hold the end-diastolic 0.933 kPa: give a larger mechanics.material.stiffness_kPa" in told
 
 
 @pytest.mark.slow

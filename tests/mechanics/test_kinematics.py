@@ -36,9 +36,10 @@ def test_deformed_axes_stay_orthonormal_and_follow_the_material(wall):
 
 def test_volume_ratio_of_a_scaled_wall(wall):
     mesh, _, _ = wall
-    smallest, mean = kinematics.volume_ratios(mesh, moved(mesh, np.eye(3), 1.1 * np.eye(3)))
+    smallest, mean, rms_change = kinematics.volume_ratios(mesh, moved(mesh, np.eye(3), 1.1 * np.eye(3)))
     np.testing.assert_allclose(smallest, [1, 1.331])
     np.testing.assert_allclose(mean, [1, 1.331])
+    np.testing.assert_allclose(rms_change, [0, 0.331], atol=1e-12)
 
 
 def test_layers_add_up_to_the_wall(wall):

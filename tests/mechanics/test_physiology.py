@@ -35,6 +35,7 @@ WELL = {
     "filling_ratio": np.array(1.4),
     "ejection_fraction": np.array(0.64),
     "volume_ratio_min": np.array(0.32),
+    "volume_change_rms": np.array(0.02),
     "loop_error": np.array(1e-8),
     "tension_min": np.array(0.0),
     "tension_es": np.array(43e3),
@@ -97,6 +98,7 @@ def measured(mesh, frames, **mechanics):
         "fibre_strain_mean": np.zeros(count),
         "fibre_strain_sd": np.zeros(count),
         "volume_ratio_min": np.ones(count),
+        "volume_change_rms": np.zeros(count),
     }
     given |= {name: mechanics.pop(name) for name in list(mechanics) if name in given}
     sides = {side: getattr(mesh, side) for side in ("endo", "epi", "base")}
@@ -144,12 +146,14 @@ def test_numbers_are_those_of_the_arrays(coarse_mesh):
     }
     still = np.tile(coarse_mesh.nodes, (4, 1, 1))
     kinematics = {"strain_mean": mean, "volume_ratio_min": np.array([1, 0.9, 0.4, 0.8])}
+    kinematics |= {"volume_change_rms": np.array([0, 0.01, 0.02, 0.04])}
     found = measured(coarse_mesh, still, **mechanics, **kinematics)
     expected = {
         "longitudinal_strain": -0.09,
         "circumferential_strain": -0.17,
         "ejection_fraction": 0.6,
         "volume_ratio_min": 0.4,
+        "volume_change_rms": 0.02,
         "loop_error": 0.3 / 30.3,
         "tension_min": -200,
         "tension_es": 40e3,
@@ -229,6 +233,7 @@ VIOLATIONS = [
     ({"twist": np.radians([0, 12, -61])}, "twist (deg) is 61 and must be at most 40 (physiology.twist_max_deg)"),
     ({"volume_ratio_min": -0.1}, "det F of all points and frames is -0.1 and must be at least 0.2"),
     ({"volume_ratio_min": np.nan}, "det F of all points and frames is not a number and must be at least 0.2"),
+    ({"volume_change_rms": 0.14}, "det F - 1 at end-systole is 0.14 and must be at most 0.03"),
     ({"loop_error": 0.02}, "error of pressure or volume is 0.02 and must be at most 0.005"),
     ({"tension_min": -3e3}, "smallest active tension (kPa) is -3 and must be at least -1"),
     ({"active_tension": 1e3 * np.array([0, 40, 10, 40, 10, 0])}, "one rise and fall is 1.75 and must be at most 1.5"),

@@ -75,9 +75,10 @@ class Mechanics(Section):
     bulk_modulus_kPa: Annotated[FiniteFloat, Field(ge=100)] = 20_000.0
     """Penalty on volume change of each element; at 2000 kPa the wall loses 1 % of its volume in systole."""
     pointwise_bulk_ratio: Annotated[FiniteFloat, Field(ge=0, le=1000)] = 300.0
-    """Penalty on volume change at each point of an element, over C, without which strain is a staircase through the
-    wall: with 300 the strains RR, CC and LL of the default mouse are within 3 % of those of a mesh thrice as fine, with
-    20 within 10 %, and with 1000 the solver needs twice the steps."""
+    """Penalty on volume change at each point of an element, over C of the default law with its default constants, and
+    for other laws in proportion to their stiffness at a fibre stretch of 1.1. Without it strain is a staircase through
+    the wall: with 300 the strains RR, CC and LL of the default mouse are within 3 % of those of a mesh thrice as fine,
+    with 20 within 10 %, and with 1000 the solver needs twice the steps."""
     viscosity_Pa_s: Annotated[FiniteFloat, Field(ge=0)] = 1.0
     """Viscous stress over the rate of Green-Lagrange strain. It lets a wall whose fibres weaken as they shorten pass to
     the next equilibrium where none is near; otherwise it is a fraction of a per cent of the stress."""

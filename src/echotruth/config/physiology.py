@@ -26,6 +26,9 @@ class Physiology(Section):
     healthy hearts (Young & Cowan 2012, doi 10.1186/1532-429X-14-49); with the wrong fibres it is 60 to 90 deg."""
     volume_ratio_min: Fraction | None = 0.2
     """Smallest det F at any point in any frame: elements below it nearly collapse. The default heart has 0.93."""
+    volume_change_rms_max: Positive | None = 0.03
+    """Largest root mean square of det F - 1 over the wall at end-systole, where each point should keep its volume. By
+    law, mouse and human have 0.014 to 0.024 with one element through the wall, 0.003 to 0.008 with three."""
     loop_error_max: Annotated[FiniteFloat, Field(gt=0)] | None = 0.005
     """Largest relative difference between prescribed and solved pressure or volume in any frame."""
     tension_min_kPa: FiniteFloat | None = -1.0

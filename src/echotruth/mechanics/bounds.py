@@ -66,6 +66,11 @@ _OUTPUT = _in("mL_per_min_per_g", "cardiac_output", "wall_mass")
 BOUNDS = (
     Bound("loop_error_max", "the largest relative error of pressure or volume", itemgetter("loop_error")),
     Bound("volume_ratio_min", "the smallest det F of all points and frames", itemgetter("volume_ratio_min")),
+    Bound(
+        "volume_change_rms_max",
+        f"the root mean square of det F - 1 {_ES}",
+        itemgetter("volume_change_rms"),
+    ),
     Bound("longitudinal_strain_max", f"the mean longitudinal strain {_ES}", itemgetter("longitudinal_strain")),
     Bound("twist_max_deg", "the largest twist (deg)", _magnitude(_in_degrees("twist"))),
     *_range("ejection_fraction", "", "the ejection fraction", itemgetter("ejection_fraction")),

@@ -139,7 +139,7 @@ def strain_along(strains: Floats, direction: Floats) -> Floats:
     return along
 
 
-def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
+def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats, Floats]:
     """Volume ratio J = det F at the quadrature points.
 
     Parameters
@@ -149,18 +149,19 @@ def volume_ratios(mesh: Mesh, displacement: Floats) -> tuple[Floats, Floats]:
 
     Returns
     -------
-    smallest, mean : ndarray of shape (n_frames,)
-        The mean is weighted by unloaded volume.
+    smallest, mean, rms_change : ndarray of shape (n_frames,)
+        The mean of J and the root mean square of J - 1 are weighted by unloaded volume.
     """
     from echotruth.mechanics.solver import element
 
     wall = element.build_elements(mesh)
     volume, c = wall.weight, np.empty((*wall.weight.shape, 6))
-    ratio = np.empty((2, len(displacement)))
+    ratio = np.empty((3, len(displacement)))
     for frame, u in enumerate(displacement):
         j = element.right_cauchy_green(mesh.nodes + u, wall, c)
-        ratio[:, frame] = j.min(), np.sum(j * volume) / np.sum(volume)
-    return ratio[0], ratio[1]
+        total = np.sum(volume)
+        ratio[:, frame] = j.min(), np.sum(j * volume) / total, np.sqrt(np.sum((j - 1) ** 2 * volume) / total)
+    return ratio[0], ratio[1], ratio[2]
 
 
 def weighted_mean_sd(values: Floats, weight: Floats) -> tuple[Floats, Floats]:

@@ -47,7 +47,7 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
     axes = fibres.wall_axes(mesh, depth, fibres.CENTROID)[:, 0]
     frames = fibres.fibre_frames(mesh, depth, config.fibres, fibres.CENTROID, config.seed)[:, 0]
     displacement = mechanics["displacement"]
-    smallest, mean = kinematics.volume_ratios(mesh, displacement)
+    smallest, mean, rms_change = kinematics.volume_ratios(mesh, displacement)
     gradient = kinematics.deformation_gradient(mesh, displacement)[:, :, 0]
     strain = kinematics.strain_since_ed(gradient, axes)
     return {
@@ -64,6 +64,7 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
             **_wall_strain_statistics(config, wall, displacement),
             "volume_ratio_min": smallest,
             "volume_ratio_mean": mean,
+            "volume_change_rms": rms_change,
         },
     }
 

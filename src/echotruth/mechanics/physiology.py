@@ -52,6 +52,7 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays, depth: Flo
         **_times(mechanics),
         **_pump(mesh, mechanics),
         "volume_ratio_min": kinematics["volume_ratio_min"].min(),
+        "volume_change_rms": kinematics["volume_change_rms"][es],
         "loop_error": np.asarray(max(_largest_error(mechanics, quantity) for quantity in ("pressure", "volume"))),
         "tension_min": tension.min(),
         "tension_es": tension[es],

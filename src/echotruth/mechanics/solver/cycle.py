@@ -14,13 +14,15 @@ from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
 from echotruth.loop.cycle import Cycle
+from echotruth.mechanics.solver.cavity import cavity_volume
 from echotruth.mechanics.solver.equilibrium import Equilibrium, Load, State, Unknown
 from echotruth.mechanics.solver.newton import Diverged, LoadStepper, linear_combination
+from echotruth.mechanics.solver.stress import relative_stiffness
 
 logger = logging.getLogger("echotruth.mechanics")
 
 INITIAL_STIFFNESS = 1100.0
-"""Stiffness (Pa) from which the search for it starts."""
+"""Stiffness (Pa) from which the search for it starts, of the default law."""
 
 LEAST_FILLING = 1.1
 """Smallest end-diastolic volume over that of the unloaded cavity with which the hearts of all three species beat."""
@@ -154,31 +156,51 @@ def filled_to_end_diastole(
     Diverged
         If the heart cannot be filled.
     """
-    stepper = LoadStepper(equations, INITIAL_STIFFNESS if stiffness is None else stiffness)
+    law = equations.law
+    initial = INITIAL_STIFFNESS / relative_stiffness(law.energy, law.constants) if stiffness is None else stiffness
     if cycle.pressure is None:
+        stepper = LoadStepper(equations, initial)
         stepper.advance(Load(0.0, cycle.edv, 0.0), "cavity_pressure")
     else:
-        _fill_to_pressure(stepper, cycle, stiffness, predictors)
+        stepper = _filled_to_pressure(equations, cycle, stiffness is None, initial, predictors)
     stepper.rest()
     return stepper
 
 
-def _fill_to_pressure(
-    stepper: LoadStepper, cycle: Cycle, stiffness: float | None, predictors: tuple[State, ...]
-) -> None:
+def _filled_to_pressure(
+    equations: Equilibrium, cycle: Cycle, stiffness_unknown: bool, initial: float, predictors: tuple[State, ...]
+) -> LoadStepper:
     assert cycle.pressure is not None
-    unloaded_volume, pressure = stepper.load.volume, float(cycle.pressure[0])
-    if stiffness is None and cycle.edv <= unloaded_volume:
+    pressure = float(cycle.pressure[0])
+    if stiffness_unknown:
+        _check_volume(equations, cycle)
+    # A law without exponential has a limit point: a pressure, in proportion to C, beyond which no wall holds it.
+    for stiffness in (initial, 2 * initial, 4 * initial) if stiffness_unknown else (initial,):
+        stepper = LoadStepper(equations, stiffness)
+        try:
+            stepper.advance(Load(pressure, 1.0, 0.0), None, predictors)
+            break
+        except Diverged as failure:
+            logger.debug("%s", failure)
+    else:
+        holds = f"a wall with C = {stiffness / 1e3:.3g} kPa does not hold the end-diastolic {pressure / 1e3:.3g} kPa"
+        raise Diverged(f"{holds}: give a larger mechanics.material.stiffness_kPa or a finer mesh.")
+    logger.info("filled to %.4g uL with C = %.4g kPa", stepper.load.volume * 1e9, stepper.state.stiffness / 1e3)
+    if stiffness_unknown:
+        state = stepper.advance(Load(pressure, cycle.edv, 0.0), "stiffness")
+        logger.info("C = %.4g kPa for an end-diastolic volume of %.4g uL", state.stiffness / 1e3, cycle.edv * 1e9)
+    return stepper
+
+
+def _check_volume(equations: Equilibrium, cycle: Cycle) -> None:
+    """Refuse a volume at end-diastole that is not above that of the unloaded cavity."""
+    unloaded_volume = cavity_volume(equations.mesh.nodes, equations.mesh.endo)
+    if cycle.edv <= unloaded_volume:
         least = LEAST_FILLING * unloaded_volume
         volumes = f"{cycle.edv * 1e9:.3g} uL at end-diastole, and the unloaded cavity {unloaded_volume * 1e9:.3g} uL"
         shrunk = (cycle.edv / least) ** (1 / 3)
         remedy = f"give loop.edv_uL of {least * 1e9:.3g} or more, or {shrunk:.3g} of this geometry.scale or less"
         raise Diverged(f"the loop has {volumes}: {remedy}.")
-    stepper.advance(Load(pressure, 1.0, 0.0), None, predictors)
-    logger.info("filled to %.4g uL with C = %.4g kPa", stepper.load.volume * 1e9, stepper.state.stiffness / 1e3)
-    if stiffness is None:
-        state = stepper.advance(Load(pressure, cycle.edv, 0.0), "stiffness")
-        logger.info("C = %.4g kPa for an end-diastolic volume of %.4g uL", state.stiffness / 1e3, cycle.edv * 1e9)
 
 
 def solved_frames(stepper: LoadStepper, cycle: Cycle, tension_scale: Floats) -> Iterator[SolvedFrame]:

@@ -72,7 +72,7 @@ class WallLaw(NamedTuple):
     bulk_modulus : float, Pa
         kappa, of the mean volume of each cell.
     pointwise_bulk_ratio : float
-        Pointwise bulk modulus divided by C.
+        Pointwise bulk modulus divided by C, of this law.
     viscosity : float, Pa s
     cross_fibre : ndarray of shape (2,)
         Shares of the active tension that act along sheet and normal too.

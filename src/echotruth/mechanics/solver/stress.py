@@ -5,12 +5,14 @@ have their tensor components, tangents act on strains with doubled shear. The nu
 functions fill arrays passed to them, for one point at a time.
 """
 
+from collections.abc import Callable
 from math import sqrt
 
 import numpy as np
 from numba import njit
 
 from echotruth.arrays import Floats
+from echotruth.materials import DEFAULT, LAWS
 
 PAIRS = np.array([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)])
 """Axes of each component."""
@@ -23,6 +25,38 @@ MULTIPLICITY = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
 
 _PAIRED = np.array([[COMPONENT[[p, q, p, q], [r, s, s, r]] for r, s in PAIRS] for p, q in PAIRS])
 """Components pr, qs, ps and qr for each two components pq and rs."""
+
+
+REFERENCE_STRETCH = 1.1
+"""Of the fibre, about that of a filled heart, at which laws are compared: hearts of different laws have the same volume
+at the same pressure, so that C times this stiffness is alike, while at rest that of an exponential law is much less."""
+
+
+def relative_stiffness(energy: Callable, constants: Floats) -> float:
+    """Stiffness of a passive law for a C of one, over that of the default law.
+
+    The trace of the isochoric dS/dE, which is the sum of the stiffness over all independent strains, at a uniaxial
+    stretch of the fibre, l along it and 1 / sqrt(l) across.
+
+    Parameters
+    ----------
+    energy : callable
+        Of a module of `materials`, compiled or not.
+    constants : ndarray
+        Its constants.
+    """
+    default = LAWS[DEFAULT]
+    return _stiffness(energy, constants) / _stiffness(default.energy, default.Law().constants())
+
+
+def _stiffness(energy: Callable, constants: Floats) -> float:
+    c = np.array([REFERENCE_STRETCH**2, 1 / REFERENCE_STRETCH, 1 / REFERENCE_STRETCH, 0.0, 0.0, 0.0])
+    inverse, strain, stress, tangent = np.empty(6), np.empty(6), np.empty(6), np.empty((6, 6))
+    factor = isochoric_strain(c, invert(c, inverse), strain)
+    energy(strain, constants, stress, tangent)
+    trace = isochoric_stress(c, inverse, factor, stress)
+    isochoric_tangent(c, inverse, factor, trace, stress, tangent)
+    return float(np.diag(tangent) @ MULTIPLICITY)
 
 
 @njit(cache=True, error_model="numpy")

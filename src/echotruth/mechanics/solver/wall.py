@@ -15,6 +15,7 @@ from echotruth.mechanics.pathology import Tissue, tissue
 from echotruth.mechanics.solver import element
 from echotruth.mechanics.solver.active_stress import ActiveLaw
 from echotruth.mechanics.solver.equilibrium import Equilibrium
+from echotruth.mechanics.solver.stress import relative_stiffness
 from echotruth.mechanics.solver.support import base_support
 from echotruth.mechanics.solver.surroundings import surroundings
 from echotruth.units import kPa
@@ -71,7 +72,8 @@ def wall_law(section: Mechanics) -> element.WallLaw:
     """Laws of the wall, SI, from their section of the configuration."""
     active = active_law(section.active)
     passive = compiled(section.material.law), section.material.constants()
-    volumetric = section.bulk_modulus_kPa * kPa, section.pointwise_bulk_ratio
+    pointwise_bulk_ratio = section.pointwise_bulk_ratio * relative_stiffness(*passive)
+    volumetric = section.bulk_modulus_kPa * kPa, pointwise_bulk_ratio
     cross_fibre = np.array([section.active.sheet_share, section.active.normal_share])
     return element.WallLaw(*passive, active, *volumetric, section.viscosity_Pa_s, cross_fibre)
 
