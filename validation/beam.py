@@ -50,7 +50,7 @@ class Results:
     line: Floats
 
 
-class FollowerPressureBeam(Equilibrium):
+class FollowerPressureBody(Equilibrium):
     """A body with a pressure on a surface whose rim moves.
 
     The force of the pressure is the gradient of a volume, as in a heart, only where the rim stays in a plane; here it
@@ -81,7 +81,7 @@ def solve_beam(counts: bodies.Counts) -> tuple[int, float, Floats]:
     free = np.ones(mesh.nodes.shape, dtype=bool)
     free[body.side(1, 0.0)] = False
     frames = np.broadcast_to(np.eye(3), (len(mesh.cells), 14, 3, 3))
-    beam = FollowerPressureBeam(mesh, frames, MODEL.law(), bodies.cartesian_support(free))
+    beam = FollowerPressureBody(mesh, frames, MODEL.law(), bodies.cartesian_support(free))
     positions = beam.positions(_newton(beam))
     beam.close()
     height, along, width = body.parameters.T
@@ -90,7 +90,7 @@ def solve_beam(counts: bodies.Counts) -> tuple[int, float, Floats]:
     return len(mesh.cells), float(tip[0]), line[np.argsort(line[:, 0])]
 
 
-def _newton(beam: FollowerPressureBeam) -> State:
+def _newton(beam: FollowerPressureBody) -> State:
     """Bent state by full Newton steps: a line search would stop where the beam stretches on its way to bending."""
     state = beam.unloaded_state(MODEL.stiffness)
     for pressure in PRESSURE * np.arange(1, LOAD_STEPS + 1) / LOAD_STEPS:

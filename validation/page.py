@@ -8,10 +8,10 @@ from time import perf_counter
 from types import ModuleType
 
 from echotruth.report import style
-from validation import beam, indifference, inflation, patch, refinement, ventricle, work
+from validation import beam, elastodynamics, indifference, inflation, patch, refinement, ventricle, work
 from validation.report import Report
 
-CHECKS = (patch, inflation, beam, ventricle, refinement, work, indifference)
+CHECKS = (patch, inflation, beam, ventricle, elastodynamics, refinement, work, indifference)
 """In the order of the page."""
 
 _HEAD = """# What was checked, against what

@@ -5,7 +5,7 @@ import pytest
 
 from validation.page import CHECKS
 
-SLOW = {"ventricle", "refinement", "inflation", "beam", "work", "indifference"}
+SLOW = {"ventricle", "elastodynamics", "refinement", "inflation", "beam", "work", "indifference"}
 
 
 def named(check):
