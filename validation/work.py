@@ -66,6 +66,7 @@ class _VirtualWork:
     def __init__(self, solved: heart.SolvedBeat) -> None:
         self.mesh, self.beat, self.previous_states = solved.wall.mesh, solved.beat, solved.previous_states
         self.section, xi = solved.config.mechanics, tetrahedron()[0]
+        self.right_pressure_ratio = solved.config.loop.right_pressure_ratio
         self.tension_scale = solved.wall.tissue.tension_scale[:, None]
         dN_dX, volume = material_gradients(self.mesh, xi)
         self.volume = volume * tetrahedron()[1]
@@ -94,13 +95,20 @@ class _VirtualWork:
         return self._blood(u, change, beat.pressure[frame]), *of_wall, self._surroundings(u, change, frame)
 
     def _blood(self, u: Floats, change: Floats, pressure: float) -> float:
-        """Pressure times the derivative of the volume V(u + s change) by s, by differences: V is cubic in s."""
+        """Pressure times the derivative of the volume V(u + s change) by s, by differences: V is cubic in s.
+
+        That of a right ventricle, whose rim stays in the plane of the base, counts by the ratio of the pressures.
+        """
 
         def difference(s: float) -> float:
-            ends = (cavity_volume(self.mesh.nodes + u + side * s * change, self.mesh.endo) for side in (1, -1))
+            ends = (self._borne_volume(self.mesh.nodes + u + side * s * change) for side in (1, -1))
             return next(ends) - next(ends)
 
         return pressure * (8 * difference(1.0) - difference(2.0)) / 12
+
+    def _borne_volume(self, nodes: Floats) -> float:
+        right = self.right_pressure_ratio * cavity_volume(nodes, self.mesh.right_endo)
+        return cavity_volume(nodes, self.mesh.endo) + right
 
     def _passive(self, f: Floats) -> complex:
         local = self.section.pointwise_bulk_ratio / 2 * (energies.determinant(f) - 1) ** 2

@@ -14,6 +14,12 @@ SHORT_AXIS = np.array([[-1.0, 0, 0], [0, -1.0, 0], [0, 0, 1.0]])
 """Rows: lateral, axial and elevation axis of all short-axis views, in the heart frame."""
 
 
+def in_right_wall(wall_depth: Floats, cells: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Whether cells (n_cells, 10) belong to the free wall of a right ventricle, through which the wall depth (n_nodes,)
+    goes from 1 to 2; (n_cells,)."""
+    return wall_depth[cells].max(axis=1) > 1
+
+
 @dataclass(frozen=True)
 class RigidMotion:
     """Rigid motion of a heart relative to a probe: x goes to c + R (x - c) + d.
@@ -53,6 +59,7 @@ class Heart:
     displacement : ndarray of shape (frame, n_nodes, 3), m
         From unloaded; frame 0 is end-diastole.
     wall_depth : ndarray of shape (n_nodes,)
+        Above 1 in the free wall of a right ventricle.
     endo : ndarray of shape (n_facets, 6)
         Nodes of the endocardial triangles.
     layers : int
@@ -104,6 +111,11 @@ class Heart:
             config=config,
             arrays=arrays,
         )
+
+    @property
+    def right_wall(self) -> NDArray[np.bool_]:
+        """Cells of the free wall of a right ventricle, (n_cells,): tissue without truth of its own."""
+        return in_right_wall(self.wall_depth, self.cells)
 
     @property
     def apex(self) -> float:

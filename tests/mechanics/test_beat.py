@@ -37,6 +37,7 @@ def test_arrays_and_their_dimensions_are_those_of_the_schema(case):
     assert set(case) == set(HEART) - {"physiology"}
     for group, arrays in case.items():
         schema = arrays_of(group) | ({"time": COORDINATES["time"]} if group == "mechanics" else {})
+        schema.pop("right_endo", None)  # of a heart with two ventricles
         assert set(arrays) == set(schema)
         assert {name: array.ndim for name, array in arrays.items()} == {
             name: len(array.dims) for name, array in schema.items()

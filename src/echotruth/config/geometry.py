@@ -22,7 +22,9 @@ class CellLabels(Section):
 
 
 class BoundaryLabels(Section):
-    """Endocardium, epicardium and base as labelled in the mesh file; unlabelled ones are detected."""
+    """Endocardium, epicardium and base as labelled in the mesh file; unlabelled ones are detected.
+
+    With `right_endo` the mesh has two ventricles (docs/own_heart.md)."""
 
     array: str = "gmsh:physical"
     """Array over the triangles of the file, or over its points: a facet has the value that all its corners share."""
@@ -32,6 +34,14 @@ class BoundaryLabels(Section):
     """Values at the epicardium."""
     base: list[int | str] = Field(default=[])
     """Values at the base."""
+    right_endo: list[int | str] = Field(default=[])
+    """Values at the endocardium of a right ventricle, on which `loop.right_pressure_ratio` acts, over the triangles of
+    the file; needs the three others."""
+
+    @check
+    def _check_right(self) -> None:
+        is_named = not self.right_endo or bool(self.endo and self.epi and self.base)
+        self.require(is_named, "right_endo", "needs endo, epi and base too, which are not detected beside it")
 
 
 class Geometry(Section):
@@ -78,8 +88,8 @@ class Geometry(Section):
     surface_labels: BoundaryLabels | None = None
     """Labels of endocardium, epicardium and base in the file. Default: they are detected."""
     septum: CellLabels | None = None
-    """Cells of the file that belong to the septum, which is rotated to +x. Default: `septum_point`, or the file's own x
-    axis."""
+    """Cells of the file that belong to the septum, which is rotated to +x. Default: `septum_point`, or the right
+    endocardium where it is named, or the file's own x axis."""
     septum_point: Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)] | None = None
     """Point in the septum or right of it, in the coordinates of the file; it is rotated to +x."""
     remesh: bool = False
@@ -91,6 +101,11 @@ class Geometry(Section):
     """Array of fibre directions over the cells of the file, for `fibres.source: file`."""
     sheet: str | None = None
     """Array of sheet directions over the cells of the file; needs `fibre`."""
+
+    @property
+    def has_right_ventricle(self) -> bool:
+        """Whether the mesh file has the endocardium of a right ventricle too."""
+        return self.surface_labels is not None and bool(self.surface_labels.right_endo)
 
     def lengths(self) -> Lengths:
         """Lengths of the ellipsoid, with those of the preset where none is given.
@@ -148,6 +163,8 @@ class Geometry(Section):
                 self._refuse(("apex_wall_mm",), "applies to the ellipsoid, because a tube has no apex: leave it out")
             return
         self._refuse(_ELLIPSOID_KEYS, "applies to the ellipsoid: leave it out, because geometry.file is given")
+        remedy = "must be false with surface_labels.right_endo, because it meshes a wall round one cavity"
+        self.require(not (self.remesh and self.has_right_ventricle), "remesh", remedy)
         if not self.remesh:
             self._refuse(_REMESH_KEYS, "needs remesh: true if the wall is read from a file")
         has_fibres = self.sheet is None or self.fibre is not None

@@ -75,6 +75,10 @@ class Loop(Section):
     """End-diastolic pressure; pressures up to it are scaled, those above mapped linearly. Default: that of the file."""
     esp_mmHg: Pressure | None = None
     """End-systolic pressure, likewise."""
+    right_pressure_ratio: Annotated[FiniteFloat, Field(ge=0, le=2)] = 0.2
+    """Pressure in the right ventricle over that in the left at every instant, where the mesh has one
+    (`geometry.surface_labels.right_endo`). In people at rest the systolic pressures are 21 +- 4 (Kovacs et al., Eur
+    Respir J 34 (2009) 888; recalled) to 25 and some 120 mmHg."""
     frames: Annotated[int, Field(ge=2, le=1000)] = 40
     """Frames of one cycle; frame 0 is end-diastole."""
 

@@ -26,6 +26,9 @@ _TRACKER_LENGTHS = ("window_mm", "windows_mm", "knots_mm")
 """Keys of trackers that must not exceed the image."""
 
 
+_RIGHT = "geometry.surface_labels.right_endo"
+
+
 class Config(Section):
     """Configuration of a repository."""
 
@@ -139,6 +142,13 @@ class Config(Section):
         self.require(kind != "beat" or not is_tube, "geometry.shape", remedy)
 
     @check
+    def _check_right_ventricle(self) -> None:
+        default = Loop.model_fields["right_pressure_ratio"].default
+        acts = self.geometry.has_right_ventricle or self.loop.right_pressure_ratio == default
+        remedy = f"needs {_RIGHT}, the right endocardium on which that pressure acts"
+        self.require(acts, "loop.right_pressure_ratio", remedy)
+
+    @check
     def _check_motion_file(self) -> None:
         if self.motion.kind != "file":
             return
@@ -157,6 +167,7 @@ class Config(Section):
         reasons = (
             (self.phantom.in_plane_only, "phantom.in_plane_only is true, because it fills a volume"),
             (self.geometry.shape == "tube", "geometry.shape is tube, because an open tube has no closed cavity"),
+            (self.geometry.has_right_ventricle, f"{_RIGHT} is given, because tissue would fill the right cavity"),
         )
         for key in (
             "blood.level_dB",

@@ -5,7 +5,7 @@ material point, given by a tetrahedron and local coordinates xi in it; the shape
 carry it to x(xi) = sum_a N_a(xi) x_a.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,8 @@ class Mesh:
         their normals point out of the wall.
     fibre, sheet : ndarray of shape (n_cells, 3), optional
         Directions of fibres and sheets that came with the mesh, of any length.
+    right_endo : ndarray of shape (n_facets, 6)
+        Triangles of the endocardium of a right ventricle; none in a left ventricle alone.
     """
 
     nodes: Floats
@@ -51,6 +53,7 @@ class Mesh:
     base: Integers
     fibre: Floats | None = None
     sheet: Floats | None = None
+    right_endo: Integers = field(default_factory=lambda: np.empty((0, 6), np.int32))
 
 
 @dataclass(frozen=True)

@@ -126,9 +126,9 @@ def _pixels(plane: Plane, axial: Floats, lateral: Floats) -> Floats:
 
 
 def _locate_in_wall(heart: Heart, frame: int, positions: Floats) -> tuple[NDArray[np.int64], MaterialPoints]:
-    """Indices of the positions (n, 3), m, that are in the wall in a frame, and the material points there."""
+    """Indices of the positions (n, 3), m, that are in the left wall in a frame, and the material points there."""
     points = locate(heart.positions(frame), heart.cells, positions)
-    inside = np.flatnonzero(points.cell >= 0)
+    inside = np.flatnonzero((points.cell >= 0) & ~heart.right_wall[points.cell])
     return inside, MaterialPoints(points.cell[inside], points.xi[inside])
 
 

@@ -6,11 +6,15 @@ Helix and sheet angle are alpha and beta of Bayer et al., Ann Biomed Eng 40 (201
 the two rules differ.
 """
 
+from dataclasses import replace
+
 import numpy as np
+from numpy.typing import NDArray
 
 from echotruth.config import Fibres
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
+from echotruth.heart import in_right_wall
 from echotruth.mechanics import angles, disarray
 from echotruth.units import deg, mm
 
@@ -25,7 +29,9 @@ class FibreError(ValueError):
 def wall_depth(mesh: Mesh) -> Floats:
     """Relative distance through the wall, along the field lines of Laplace's equation.
 
-    On a tube or a sphere it is linear in the radius, where the potential itself is not.
+    On a tube or a sphere it is linear in the radius, where the potential itself is not. Where there is a right
+    ventricle, its free wall is taken off, and what is laid bare counts as epicardium of the left one; through the free
+    wall the depth goes from 1 to 2.
 
     Parameters
     ----------
@@ -35,12 +41,41 @@ def wall_depth(mesh: Mesh) -> Floats:
     -------
     ndarray of shape (n_nodes,)
         L0 / (L0 + L1), with the lengths L0 to the endocardium (depth 0) and L1 to the epicardium
-        (depth 1); Yezzi & Prince, IEEE Trans Med Imaging 22 (2003) 1332.
+        (depth 1); Yezzi & Prince, IEEE Trans Med Imaging 22 (2003) 1332. In the free wall of the right ventricle it
+        is one more.
+    """
+    endo, epi, right_endo = map(np.unique, (mesh.endo, mesh.epi, mesh.right_endo))
+    if not len(right_endo):
+        return _depth_between(mesh, endo, epi)
+    is_right = _right_free_wall(mesh, endo, epi, right_endo)
+    left, right = (replace(mesh, cells=mesh.cells[cells]) for cells in (~is_right, is_right))
+    shared = np.intersect1d(left.cells, right.cells)
+    depth = _depth_between(left, endo, np.unique(np.concatenate([epi, right_endo, shared])))
+    apart = np.setdiff1d(right.cells, shared)
+    depth[apart] = 1 + _depth_between(right, right_endo, epi)[apart]
+    return depth
+
+
+def _right_free_wall(mesh: Mesh, endo: Integers, epi: Integers, right_endo: Integers) -> NDArray[np.bool_]:
+    """Cells of the free wall of a right ventricle, (n_cells,), given the nodes of the three surfaces.
+
+    Every wall lies between two of the surfaces. Of the three potentials that are 1 at one of them and 0 at the two
+    others, that of the third surface is the smallest there.
     """
     xi, weight = tetrahedron()
     dN_dX, volume = material_gradients(mesh, xi)
+    laplace = np.einsum("cqai,cqbi,cq->cab", dN_dX, dN_dX, volume * weight)
+    of_left = _minimize(mesh, laplace, None, np.concatenate([epi, right_endo]), endo)
+    of_right = _minimize(mesh, laplace, None, np.concatenate([epi, endo]), right_endo)
+    left, right = (values[mesh.cells].mean(axis=1) for values in (of_left, of_right))
+    return (left < right) & (left < 1 - left - right)
+
+
+def _depth_between(mesh: Mesh, endo: Integers, epi: Integers) -> Floats:
+    """Wall depth (n_nodes,) between nodes of depth 0 and nodes of depth 1."""
+    xi, weight = tetrahedron()
+    dN_dX, volume = material_gradients(mesh, xi)
     volume = volume * weight
-    endo, epi = np.unique(mesh.endo), np.unique(mesh.epi)
     laplace = np.einsum("cqai,cqbi,cq->cab", dN_dX, dN_dX, volume)
     potential = _minimize(mesh, laplace, None, endo, epi)
     dN_ds = np.einsum("cqai,cqi->cqa", dN_dX, unit(_gradient(mesh, potential, dN_dX)))
@@ -212,7 +247,9 @@ def fibre_frames(mesh: Mesh, depth: Floats, fibres: Fibres, xi: Floats, seed: in
         of_cell = _frames_of_file(mesh, wall_axes(mesh, depth, CENTROID)[:, 0, 0])
         frames = np.repeat(of_cell[:, None], len(xi), axis=1)
     else:
-        frames = angles.frames_from_angles(axes, *rule_angles(fibres, interpolate_in_cells(mesh, depth, xi)))
+        # The free wall of a right ventricle has the angles of the left one.
+        through = interpolate_in_cells(mesh, depth, xi) - in_right_wall(depth, mesh.cells)[:, None]
+        frames = angles.frames_from_angles(axes, *rule_angles(fibres, through))
     if fibres.disarray_deg:
         positions = np.einsum("qa,cai->cqi", shape(xi), mesh.nodes[mesh.cells])
         field = disarray.random_field(positions, fibres.disarray_length_mm * mm, seed)

@@ -9,6 +9,7 @@ from echotruth.aha import segment
 from echotruth.config import Config
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats, Mesh, shape
+from echotruth.heart import in_right_wall
 from echotruth.mechanics import fibres, kinematics
 from echotruth.mechanics.solver.wall import Wall
 
@@ -55,6 +56,7 @@ def collect_outputs(config: Config, wall: Wall, mechanics: Arrays) -> dict[str, 
             "node_position": mesh.nodes,
             "cell_node": mesh.cells,
             **{side: getattr(mesh, side) for side in ("endo", "epi", "base")},
+            **({"right_endo": mesh.right_endo} if len(mesh.right_endo) else {}),
         },
         "fibres": _fibre_arrays(mesh, depth, frames, config.fibres.layers),
         "pathology": {name: values for name, values in vars(wall.tissue).items() if name != "taut_stiffness"},
@@ -76,7 +78,7 @@ def _fibre_arrays(mesh: Mesh, depth: Floats, frames: Floats, layers: int) -> Arr
         "fibre": frames[:, 0],
         "sheet": frames[:, 1],
         "layer": fibres.layer(fibres.interpolate_in_cells(mesh, depth, fibres.CENTROID)[:, 0], layers).astype(np.uint8),
-        "segment": segment(centroid, mesh.nodes[mesh.endo, 2].min()),
+        "segment": segment(centroid, mesh.nodes[mesh.endo, 2].min()) * ~in_right_wall(depth, mesh.cells),
     }
 
 
@@ -86,7 +88,7 @@ class WallPoints(NamedTuple):
     Attributes
     ----------
     volume : ndarray of shape (n_points,), m^3
-        Unloaded.
+        Unloaded; 0 in the free wall of a right ventricle, so that means are those of the left one.
     axes : ndarray of shape (n_cells, n_points of a cell, 3, 3)
         Rows R, C, L of the wall at ED.
     fibre : ndarray of shape (n_points, 3)
@@ -110,7 +112,7 @@ def _wall_points(config: Config, wall: Wall, at_ed: Floats) -> WallPoints:
     frames = fibres.fibre_frames(mesh, depth, config.fibres, xi, config.seed)
     fibre = kinematics.deformed_fibre_frames(frames, gradient)[..., 0, :]
     return WallPoints(
-        volume=(fibres.material_gradients(mesh, xi)[1] * weight).ravel(),
+        volume=(fibres.material_gradients(mesh, xi)[1] * weight * ~in_right_wall(depth, mesh.cells)[:, None]).ravel(),
         axes=axes,
         fibre=np.einsum("...ij,...j->...i", axes, fibre).reshape(-1, 3),
         layer=fibres.layer(fibres.interpolate_in_cells(mesh, depth, xi), config.fibres.layers).ravel(),

@@ -12,6 +12,7 @@ from echotruth.config.pathology import Infarct
 from echotruth.config.regional import Regional
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import NODE_XI, Floats, MaterialPoints, Mesh, interpolate, shape
+from echotruth.heart import in_right_wall
 from echotruth.mechanics.fibres import material_gradients, wall_depth
 from echotruth.units import deg, mm
 
@@ -97,10 +98,11 @@ def tissue(mesh: Mesh, depth: Floats, pathology: Pathology, regional: Regional) 
     """
     infarct, scar = pathology.infarct, pathology.infarct.scar()
     centroid = shape(_SAMPLES)[_CENTROID] @ mesh.nodes[mesh.cells]
-    segments = segment(centroid, _apex(mesh))
+    is_left = ~in_right_wall(depth, mesh.cells)
+    segments = segment(centroid, _apex(mesh)) * is_left
     given = regional.stiffness, regional.contractility, CONTRACTILITY if regional.preset == "normal" else {}
     of_stiffness, of_tension, healthy = (_gradual(_by_segment(one), segments, centroid) for one in given)
-    weight = _infarct_weight(mesh, depth, infarct)
+    weight = _infarct_weight(mesh, depth, infarct) * is_left
     region = np.select([weight == 1, weight > 0], [INFARCT, BORDER], HEALTHY).astype(np.uint8)
     stiffness = 1 + (scar["stiffness_scale"] - 1) * weight
     remote = infarct.remote_tension_scale if weight.any() else 1.0

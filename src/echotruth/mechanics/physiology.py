@@ -1,5 +1,7 @@
 """Measures of a solved heart; the bounds within which it is plausible stand in :mod:`.bounds`."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,7 @@ from echotruth.arrays import Floats
 from echotruth.config import Config
 from echotruth.fem.tetrahedra import Mesh, shape
 from echotruth.fem.volume import cell_volumes
+from echotruth.heart import in_right_wall
 from echotruth.loop.cycle import heart_cycle
 from echotruth.loop.haemodynamics import filling_ratio, intervals, pressure_rates
 from echotruth.loop.phases import CONTRACTION, FILLING, RELAXATION
@@ -15,7 +18,7 @@ from echotruth.mechanics.bounds import CC, LL, bounded
 from echotruth.mechanics.contours import MID_SLICE, global_longitudinal_strain, wall_thickness
 from echotruth.mechanics.fibres import CENTROID, wall_depth
 from echotruth.mechanics.geometry import epicardial_apex
-from echotruth.mechanics.geometry.boundary import area_vectors
+from echotruth.mechanics.geometry.boundary import area_vectors, boundary
 from echotruth.mechanics.kinematics import group_means
 from echotruth.mechanics.outputs import Arrays
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
@@ -42,13 +45,16 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays, depth: Flo
         not have, such as phases, pressures and tensions, is not a number.
     """
     mesh = Mesh(*(geometry[name] for name in ("node_position", "cell_node", "endo", "epi", "base")))
+    depth = wall_depth(mesh) if depth is None else depth
+    is_right = in_right_wall(depth, mesh.cells)
+    mesh, strain = _left_ventricle(mesh, depth, is_right), kinematics["strain"][:, ~is_right]
     positions = mesh.nodes + mechanics["displacement"]
     tension, es = mechanics["active_tension"], int(mechanics["es_frame"])
     return {
         **_rotations(mesh, positions, mechanics),
-        **_strains(kinematics | {"segment_strain": _segment_strain(mesh, kinematics["strain"])}, mechanics),
+        **_strains(kinematics | {"segment_strain": _segment_strain(mesh, strain)}, mechanics),
         **_axial_motion(mesh, mechanics["displacement"]),
-        **_lengths(mesh, wall_depth(mesh) if depth is None else depth, positions[[0, es]]),
+        **_lengths(mesh, depth, positions[[0, es]]),
         **_times(mechanics),
         **_pump(mesh, mechanics),
         "volume_ratio_min": kinematics["volume_ratio_min"].min(),
@@ -57,6 +63,16 @@ def measures(geometry: Arrays, mechanics: Arrays, kinematics: Arrays, depth: Flo
         "tension_min": tension.min(),
         "tension_es": tension[es],
     }
+
+
+def _left_ventricle(mesh: Mesh, depth: Floats, is_right: NDArray[np.bool_]) -> Mesh:
+    """The left ventricle of a mesh, without the cells (n_cells,) of the free wall of a right one."""
+    if not is_right.any():
+        return mesh
+    cells = mesh.cells[~is_right]
+    facets, _ = boundary(cells)
+    epi, base = facets[(depth[facets] == 1).all(axis=1)], mesh.base[(depth[mesh.base] <= 1).all(axis=1)]
+    return replace(mesh, cells=cells, epi=epi, base=base)
 
 
 def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, dict[str, float]]:

@@ -48,7 +48,8 @@ RANGES = {
     "fraction": Range(0, 1, finite=True),
     "correlation": Range(-1 - COMPLEMENT, 1 + COMPLEMENT),
     "quality": Range(-COMPLEMENT, 1 + COMPLEMENT),
-    "depth": Range(-COMPLEMENT, 1 + COMPLEMENT, finite=True),
+    # To 2 in the free wall of a right ventricle.
+    "depth": Range(-COMPLEMENT, 2 + COMPLEMENT, finite=True),
     "interpolated depth": Range(-OVERSHOOT, 1 + OVERSHOOT),
     "layer": Range(1),
     "segment": Range(0, 17),
@@ -118,12 +119,14 @@ def _labels(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
 
 def _geometry(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     nodes = len(arrays["node_position"])
-    for name in ("cell_node", "endo", "epi", "base"):
+    for name in sorted({"cell_node", "endo", "epi", "base", "right_endo"} & arrays.keys()):
         if int(arrays[name].max(initial=0)) >= nodes:
             yield name, f"names node {arrays[name].max()} of {nodes}"
 
 
 def _fibres(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+    if not config.geometry.has_right_ventricle and arrays["wall_depth"].max(initial=0) > 1 + COMPLEMENT:
+        yield "wall_depth", "has a value above 1, although there is no right ventricle"
     for name in ("fibre", "sheet"):
         if not _is_one(np.linalg.norm(arrays[name], axis=-1)):
             yield name, "has vectors whose length is not 1"

@@ -67,6 +67,7 @@ class TissueImages:
         found = self._around(frame) if self._has_around else np.zeros(shape, np.uint8)
         flat = found.reshape(-1)
         self._set_cavity(frame, flat)
+        self._set_right_wall(frame, flat)
         for label, body, pixels in self._bodies:
             flat[pixels[body.contains(frame, self._position[pixels])]] = label
         return found
@@ -135,6 +136,11 @@ class TissueImages:
             return
         nodes, near = self._cavity.positions(self._heart.positions(frame)), self._near_cavity
         flat[near[locate(nodes, self._cavity.cells, self._position[near]).cell >= 0]] = TissueLabel.CAVITY
+
+    def _set_right_wall(self, frame: int, flat: Labels) -> None:
+        cells = self._heart.cells[self._heart.right_wall]
+        if len(cells):
+            flat[locate(self._heart.positions(frame), cells, self._position).cell >= 0] = TissueLabel.RIGHT_FREE_WALL
 
     @cached_property
     def _cavity(self) -> Cavity:

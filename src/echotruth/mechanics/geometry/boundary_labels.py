@@ -1,7 +1,8 @@
 """Endocardium, epicardium and base on the boundary of a wall, as the file names them or found by their shape.
 
 The cavity is the region from which most directions meet the wall. The endocardium is the part of the boundary that
-faces it; the base is the part beyond its rim that faces the opening of the cavity; the rest is the epicardium.
+faces it; the base is the part beyond its rim that faces the opening of the cavity; the rest is the epicardium. A right
+endocardium is not found: a file that has one names all sides.
 """
 
 import logging
@@ -27,8 +28,8 @@ from echotruth.mechanics.geometry.rays import Rays, sphere_directions
 
 logger = logging.getLogger("echotruth.mechanics")
 
-ENDO, EPI, BASE = 0, 1, 2
-NAMES = ("endo", "epi", "base")
+ENDO, EPI, BASE, RIGHT_ENDO = range(4)
+NAMES = ("endo", "epi", "base", "right_endo")
 
 BASE_COSINE = np.cos(np.pi / 4)
 """Cosine of the largest angle between the normal of the base and the opening: half of a right-angled edge."""
@@ -44,7 +45,7 @@ _REMEDY = "give a wall around a cavity that is open at the base, or name its sid
 
 @dataclass(frozen=True)
 class BoundarySurface:
-    """The closed boundary of a wall with the label of each facet, `ENDO`, `EPI` or `BASE`.
+    """The closed boundary of a wall with the label of each facet, `ENDO`, `EPI`, `BASE` or `RIGHT_ENDO`.
 
     Attributes
     ----------
@@ -58,10 +59,10 @@ class BoundarySurface:
     facets: Integers
     labels: NDArray[np.int8]
 
-    def rim(self) -> Integers:
-        """Edges between endocardium and base, shape (n, 2)."""
+    def rim(self, label: int = ENDO) -> Integers:
+        """Edges between an endocardium and the base, shape (n, 2)."""
         pairs = adjacent_triangles(self.facets)
-        at_rim = pairs[(self.labels[pairs].min(axis=1) == ENDO) & (self.labels[pairs].max(axis=1) == BASE)]
+        at_rim = pairs[(np.sort(self.labels[pairs], axis=1) == sorted((label, BASE))).all(axis=1)]
         first, second = self.facets[at_rim[:, 0], :3], self.facets[at_rim[:, 1], :3]
         common = (first[:, :, None] == second[:, None]).any(axis=2)
         return first[common].reshape(-1, 2)
@@ -89,7 +90,7 @@ def label_boundary(mesh: ImportedMesh, facets: Integers, given: BoundaryLabels |
     """
     labels = _labels_of_file(mesh, facets, given) if given else np.full(len(facets), -1, dtype=np.int8)
     if (labels < 0).any():
-        all_named = all((labels == number).any() for number in range(len(NAMES)))
+        all_named = all((labels == number).any() for number in (ENDO, EPI, BASE))
         # An array over points leaves the facets at the rims open.
         if all_named and given is not None and given.array in mesh.triangle_arrays:
             completed = _fill_from_neighbours(labels, adjacent_triangles(facets))
@@ -97,11 +98,14 @@ def label_boundary(mesh: ImportedMesh, facets: Integers, given: BoundaryLabels |
             completed = _detect_labels(mesh, facets)
         labels = np.where(labels < 0, completed, labels).astype(np.int8)
     surface = BoundarySurface(mesh.nodes, facets, labels)
-    for number, name in enumerate(NAMES):
+    for number in (ENDO, EPI, BASE):
         if not (labels == number).any():
-            raise GeometryError(f"{mesh.source}: no {name} was found on its boundary: {_REMEDY}")
+            raise GeometryError(f"{mesh.source}: no {NAMES[number]} was found on its boundary: {_REMEDY}")
     if not len(surface.rim()):
         raise GeometryError(f"{mesh.source}: endocardium and base do not meet: {_REMEDY}")
+    if given is not None and given.right_endo and not len(surface.rim(RIGHT_ENDO)):
+        remedy = "name an endocardium that is open at the base with geometry.surface_labels.right_endo"
+        raise GeometryError(f"{mesh.source}: right endocardium and base do not meet: {remedy}")
     logger.info("%s: %s", mesh.source, ", ".join(f"{np.sum(labels == k)} facets {n}" for k, n in enumerate(NAMES)))
     return surface
 
@@ -113,6 +117,10 @@ def _labels_of_file(mesh: ImportedMesh, facets: Integers, given: BoundaryLabels)
     if not over_nodes:
         key = "geometry.surface_labels.array"
         named_array(mesh.triangle_arrays, given.array, mesh.source, key, "triangles or points")
+    elif given.right_endo:
+        # Points leave the facets at the rims without a label, and no detection knows two cavities.
+        remedy = "name one over its triangles, as geometry.surface_labels.right_endo needs"
+        raise GeometryError(f"{mesh.source}: geometry.surface_labels.array = {given.array!r} is over points: {remedy}")
     for number, name in enumerate(NAMES):
         configured: list[int | str] = getattr(given, name)
         values = group_numbers(configured, mesh, f"geometry.surface_labels.{name}")

@@ -17,7 +17,7 @@ from echotruth.mechanics.geometry.boundary import (
     triangle_edges,
     with_midpoints,
 )
-from echotruth.mechanics.geometry.boundary_labels import NAMES, BoundarySurface, label_boundary
+from echotruth.mechanics.geometry.boundary_labels import NAMES, RIGHT_ENDO, BoundarySurface, label_boundary
 from echotruth.mechanics.geometry.cut import extract_wall, named_array, select_cells
 from echotruth.mechanics.geometry.frame import HeartFrame, heart_frame
 from echotruth.mechanics.geometry.imported_mesh import METRES, ImportedMesh
@@ -56,7 +56,7 @@ def ventricle_from_file(geometry: Geometry) -> Mesh:
         _check_surface_keys(geometry)
         facets = _closed_surface(imported)
     surface = label_boundary(imported, facets, geometry.surface_labels)
-    septum = septum_point(imported, geometry)
+    septum = septum_point(imported, geometry, surface)
     if geometry.remesh:
         mesh, frame = remesh(surface, septum, geometry, source)
         check_inverted(mesh, source, "change the numbers of elements, or cut deeper with geometry.cut_mm")
@@ -146,10 +146,12 @@ def _outward(imported: ImportedMesh, facets: Integers) -> Integers:
     return facets if volume > 0 else facets[:, ::-1].copy()
 
 
-def septum_point(imported: ImportedMesh, geometry: Geometry) -> Floats | None:
-    """A point in the septum, shape (3,), m."""
+def septum_point(imported: ImportedMesh, geometry: Geometry, surface: BoundarySurface) -> Floats | None:
+    """A point in the septum or right of it, shape (3,), m."""
     if geometry.septum_point is not None:
         return np.array(geometry.septum_point) * METRES[geometry.unit] * geometry.scale
+    if geometry.septum is None and geometry.has_right_ventricle:
+        return surface.vertices(RIGHT_ENDO).mean(axis=0)
     if geometry.septum is None:
         logger.info("%s: septum not named, x is the file's own x axis", imported.source)
         return None

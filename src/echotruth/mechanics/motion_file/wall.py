@@ -91,7 +91,7 @@ def moving_wall(config: Config) -> MovingWall:
     _check_inverted(cycle, wall, edges, cells)
     cycle = cycle.beginning_at(_end_diastole(config, wall, cycle, edges, cells))
     wall, surface = _at_frame(wall, cycle, geometry)
-    frame = heart_frame(surface, septum_point(wall, geometry))
+    frame = heart_frame(surface, septum_point(wall, geometry, surface))
     positions = with_midpoints((cycle.positions - frame.origin) @ frame.axes.T, edges)
     rest = labelled_mesh(positions[0], cells, surface)
     check_flat(rest, cycle.names[0], "mesh the wall again where its motion is solved")

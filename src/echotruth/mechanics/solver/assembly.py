@@ -12,8 +12,8 @@ from echotruth.arrays import Floats
 from echotruth.fem.tetrahedra import Integers, Mesh
 from echotruth.mechanics.solver.support import Support
 
-CELLS, ENDO, EPI, BASE = range(4)
-"""Groups of elements: cells, and facets of endocardium, epicardium and base."""
+CELLS, ENDO, EPI, BASE, RIGHT_ENDO = range(5)
+"""Groups of elements: cells, and facets of endocardium, epicardium, base and endocardium of a right ventricle."""
 
 
 class Assembly:
@@ -33,9 +33,10 @@ class Assembly:
         self.n_equations = int(support.free.sum())
         self.equation = np.full(support.free.shape, -1, dtype=np.int64)
         self.equation[support.free] = np.arange(self.n_equations)
-        elements = {CELLS: mesh.cells, ENDO: mesh.endo, EPI: mesh.epi, BASE: mesh.base}
-        self.groups = (CELLS, ENDO, *surfaces)
-        self._groups = {n: self.equation[elements[n]].reshape(len(elements[n]), -1) for n in self.groups}
+        elements = {CELLS: mesh.cells, ENDO: mesh.endo, EPI: mesh.epi, BASE: mesh.base, RIGHT_ENDO: mesh.right_endo}
+        self.groups = (CELLS, ENDO, RIGHT_ENDO, *surfaces)
+        size = {n: (len(elements[n]), 3 * elements[n].shape[1]) for n in self.groups}
+        self._groups = {n: self.equation[elements[n]].reshape(size[n]) for n in self.groups}
         self._find_pattern(list(self._groups.values()))
 
     def _find_pattern(self, groups: list[NDArray[np.int64]]) -> None:
@@ -58,7 +59,7 @@ class Assembly:
         ----------
         blocks : ndarray of shape (n_cells, 30), or (n_facets, 18) for a group of facets
             Along `directions`.
-        group : CELLS, ENDO, EPI or BASE
+        group : CELLS, ENDO, EPI, BASE or RIGHT_ENDO
 
         Returns
         -------

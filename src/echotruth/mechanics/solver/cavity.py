@@ -58,8 +58,8 @@ def volume_gradient(nodes: Floats, endo: Integers) -> Floats:
     -------
     ndarray of shape (n_facets, 6, 3), m^2
     """
-    columns = (_OPERATORS.reshape(-1, 6) @ nodes[endo]).reshape(len(endo), 3, -1, 3)
-    cofactors = np.cross(columns[:, [1, 2, 0]], columns[:, [2, 0, 1]]).reshape(len(endo), -1, 3)
+    columns = (_OPERATORS.reshape(-1, 6) @ nodes[endo]).reshape(len(endo), 3, len(_WEIGHT), 3)
+    cofactors = np.cross(columns[:, [1, 2, 0]], columns[:, [2, 0, 1]]).reshape(len(endo), 3 * len(_WEIGHT), 3)
     return (-_WEIGHT[:, None] / 3 * _OPERATORS).reshape(-1, 6).T @ cofactors
 
 

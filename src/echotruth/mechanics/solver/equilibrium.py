@@ -8,6 +8,7 @@ that the support leaves free (:func:`.support.base_support`), is
     + int_epi  [k n.(u - u_ED) + d n.u'] n.v dA          surroundings.surface_matrix, Equilibrium._spring_force
     + int_base [k_z u_z v_z + k_t u_t v_t] dA            the same; only if the base is elastic
     + P int_endo v.n da                                  cavity.volume_gradient; n points into the cavity
+    + q P int_right v.n da                               the same, if there is a right ventricle; q P is its pressure
     = 0,
 
     int_c (J - 1 - p_c / kappa) dV = 0 for each cell c,  element.evaluate (Response.volume)
@@ -30,16 +31,16 @@ is the velocity. Stresses are in Pa, lengths in m.
 
 Discretised by quadratic tetrahedra (:mod:`.element`) and summed by :class:`.assembly.Assembly`, the residuals are
 
-    r = f(u, p, s) + K_e (u - u_rest) + D_e (u - u_previous) / dt - P dV/du,
+    r = f(u, p, s) + K_e (u - u_rest) + D_e (u - u_previous) / dt - P dW/du,
     r_c = v_c(u) / V_c - 1 - p_c / kappa,    r_V = V(u) - V_target,
 
 with v_c and V_c the deformed and unloaded volume of a cell and V(u) that of the cavity (:meth:`Equilibrium.residual`).
-K_e and D_e are the springs and dashpots of the surroundings (:mod:`.surroundings`), dt the time since the previous
-state. P is work-conjugate to V: its load P dV/du does the work P dV. Newton's method eliminates p_c in its cell and
-borders the tangent with s, so that one factorization of K serves both right-hand sides. With G_c = dv_c/du and
-g = dV/du:
+W = V + q V_right, which is V in a left ventricle alone. K_e and D_e are the springs and dashpots of the surroundings
+(:mod:`.surroundings`), dt the time since the previous state. P is work-conjugate to W: its load P dW/du does the work
+P dW. Newton's method eliminates p_c in its cell and borders the tangent with s, so that one factorization of K serves
+both right-hand sides. With G_c = dv_c/du and g = dV/du:
 
-    K = df/du + K_e + D_e / dt - P dg/du + sum_c kappa / V_c G_c G_c^T,
+    K = df/du + K_e + D_e / dt - P d2W/du2 + sum_c kappa / V_c G_c G_c^T,
     K du_0 = -r - sum_c kappa r_c G_c,    K du_s = -dr/ds,
     ds = -(r_V + g . du_0) / (g . du_s - dV_target/ds),    du = du_0 + ds du_s,    dp_c = kappa (r_c + G_c . du / V_c).
 """
@@ -57,7 +58,7 @@ from echotruth.arrays import Floats
 from echotruth.fem.sparse import factorization
 from echotruth.fem.tetrahedra import Mesh
 from echotruth.mechanics.solver import cavity, element
-from echotruth.mechanics.solver.assembly import CELLS, ENDO, Assembly
+from echotruth.mechanics.solver.assembly import CELLS, ENDO, RIGHT_ENDO, Assembly
 from echotruth.mechanics.solver.stress_point import ACTIVE, PASSIVE, TOTAL, VOLUMETRIC
 from echotruth.mechanics.solver.support import Support
 from echotruth.mechanics.solver.surroundings import Springs
@@ -235,6 +236,11 @@ class Equilibrium:
         Whether corrections are exact and not only good enough for Newton's method.
     taut : ndarray of shape (n_cells,), optional, Pa
         Stiffness of each cell in addition from end-diastole on.
+
+    Attributes
+    ----------
+    right_pressure_ratio : float
+        q, pressure in the right ventricle, if there is one, over that in the left; 0 unless it is set.
     """
 
     def __init__(
@@ -249,6 +255,7 @@ class Equilibrium:
         taut: Floats | None = None,
     ):
         self.mesh, self.law, self.support, self.springs = mesh, law, support, springs
+        self.right_pressure_ratio, self._right_origin = 0.0, _rim_centre(mesh)
         self.assembly = Assembly(mesh, support, tuple(surface.group for surface in springs))
         self.elements = element.build_elements(mesh, fibre_frames, support.directions)
         self.unloaded_volume = np.sum(self.elements.weight, axis=1)
@@ -324,10 +331,11 @@ class Equilibrium:
         element.evaluate(nodes, self.elements, self.law, cell_state, response)
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)
         self._volume_gradient = self.assembly.vector(self.assembly.rotate(self.mesh.endo, gradient), ENDO)
+        self._unit_load = self._volume_gradient + self._right_unit_load(nodes)
         internal = self.assembly.vector(response.force[:, TOTAL])
         for surface in filter(self._acts, self.springs):
             internal += self._spring_force(surface, nodes)
-        external = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._volume_gradient
+        external = (state.cavity_pressure if unknown == "cavity_pressure" else load.pressure) * self._unit_load
         volumetric = response.volume / self.unloaded_volume - 1 - state.cell_pressure / self.law.bulk_modulus
         target = self._volume_target(state, load, unknown)
         # V is of third degree in the positions x: V = x . dV/dx / 3 (Euler's theorem).
@@ -336,6 +344,12 @@ class Equilibrium:
         errors = norm(internal - external) / force_scale, abs(volume) / target.scale if unknown else 0.0
         volumetric_error = norm(volumetric) / np.sqrt(len(volumetric))
         return Residual(internal - external, volumetric, volume, target.slope, *errors, volumetric_error)
+
+    def _right_unit_load(self, nodes: Floats) -> Floats:
+        """q dV_right/du (n_equations,): the load on the right endocardium of a unit pressure in the left ventricle."""
+        facets = self.mesh.right_endo
+        gradient = self.right_pressure_ratio * cavity.volume_gradient(nodes - self._right_origin, facets)
+        return self.assembly.vector(self.assembly.rotate(facets, gradient), RIGHT_ENDO)
 
     def _volume_target(self, state: State, load: Load, unknown: Unknown) -> VolumeTarget:
         filled = self.previous.filled if self.previous and unknown == "cavity_pressure" else None
@@ -358,8 +372,10 @@ class Equilibrium:
         """Factor the tangent at a state."""
         self._residual(state, load, unknown, self._response)
         pressure = state.cavity_pressure if unknown == "cavity_pressure" else load.pressure
-        hessian = cavity.volume_hessian(self.positions(state, load.prescribed_fraction), self.mesh.endo)
-        blocks = [self.assembly.pack(self.mesh.endo, -pressure * hessian)]
+        nodes, right = self.positions(state, load.prescribed_fraction), self.mesh.right_endo
+        blocks = [self.assembly.pack(self.mesh.endo, -pressure * cavity.volume_hessian(nodes, self.mesh.endo))]
+        hessian = self.right_pressure_ratio * cavity.volume_hessian(nodes - self._right_origin, right)
+        blocks.append(self.assembly.pack(right, -pressure * hessian))
         for surface in self.springs:
             matrix = surface.spring + self._rate * surface.dashpot
             # Those that do not act yet keep their place in the pattern.
@@ -375,7 +391,7 @@ class Equilibrium:
     def scalar_force(self, unknown: Unknown, load: Load) -> Floats:
         """-dr/ds, shape (n_equations,), at the state evaluated last."""
         if unknown == "cavity_pressure":
-            return self._volume_gradient
+            return self._unit_load
         part, scale = PASSIVE, -self.stiffness_scale
         if unknown == "tension":
             part, scale = ACTIVE, -load.tension_fraction * np.ones(len(self.mesh.cells))
@@ -405,6 +421,15 @@ class Tangent:
             solution += scalar * self._scalar_solution
         cell_change = np.sum(self._cell_gradient * equations.assembly.of_cells(solution), axis=1)
         return Correction(solution, kappa * (residual.volumetric + cell_change / equations.unloaded_volume), scalar)
+
+
+def _rim_centre(mesh: Mesh) -> Floats:
+    """Mean position (3,), m, of the nodes at which a right endocardium meets the base; zero without one.
+
+    The cavity is closed by the cone from there to its rim, which lies in z = 0 where the base is plane and stays so.
+    """
+    rim = np.intersect1d(mesh.right_endo, mesh.base)
+    return mesh.nodes[rim].sum(axis=0) / max(len(rim), 1)
 
 
 def norm(vector: Floats) -> float:

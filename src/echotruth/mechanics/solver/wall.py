@@ -65,7 +65,10 @@ def equilibrium(config: Config, wall: Wall, exact: bool = False) -> Equilibrium:
     springs = surroundings(wall.mesh, section)
     law = wall_law(section)
     tissue = wall.tissue
-    return Equilibrium(wall.mesh, frames, law, support, tissue.stiffness_scale, springs, exact, tissue.taut_stiffness)
+    scale, taut = tissue.stiffness_scale, tissue.taut_stiffness
+    equations = Equilibrium(wall.mesh, frames, law, support, scale, springs, exact, taut)
+    equations.right_pressure_ratio = config.loop.right_pressure_ratio
+    return equations
 
 
 def wall_law(section: Mechanics) -> element.WallLaw:
