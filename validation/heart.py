@@ -1,9 +1,8 @@
-"""The default heart and the paper's, solved on a mesh of any size, with the states that viscous forces depend on."""
+"""The default heart and the paper's, solved on a mesh of any size, with the frames that viscous forces depend on."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
 
@@ -13,12 +12,13 @@ from echotruth.config import Config, Geometry
 from echotruth.config.loading import load
 from echotruth.fem.quadrature import tetrahedron
 from echotruth.fem.tetrahedra import Floats
-from echotruth.loop.cycle import read_loop
+from echotruth.loop.cycle import heart_cycle, read_loop
 from echotruth.mechanics import fibres, kinematics
+from echotruth.mechanics.beat import unloaded_wall
 from echotruth.mechanics.fibres import material_gradients
 from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.outputs import Arrays
 from echotruth.mechanics.solver.cycle import SolvedCycle, filled_to_end_diastole, solved_cycle, solved_frames
-from echotruth.mechanics.solver.equilibrium import PreviousState
 from echotruth.mechanics.solver.wall import Wall, equilibrium, wall
 
 PAPERS = Path(__file__).parents[1] / "config" / "paper.yaml"
@@ -37,22 +37,22 @@ class SolvedBeat:
     config : Config
     wall : Wall
     beat : SolvedCycle
-    previous_states : tuple of PreviousState
-        The state relative to which each frame was viscous: that of the frame before, or of a substep from it.
+    before : ndarray of shape (n_frames, n_nodes, 3), m
+        The displacement relative to which each frame was viscous: that of the frame before, or of a substep from it.
+    since : ndarray of shape (n_frames,), s
+        Time since then; none at end-diastole.
     es : int
         Frame of end-systole.
     period : float, s
-    displacement : callable
-        Map of the solution of a state to the displacement (n_nodes, 3) of its nodes, m.
     """
 
     config: Config
     wall: Wall
     beat: SolvedCycle
-    previous_states: tuple[PreviousState, ...]
+    before: Floats
+    since: Floats
     es: int
     period: float
-    displacement: Callable[[Floats], Floats]
 
     def strain(self) -> tuple[Floats, Floats]:
         """Mean and standard deviation (6,) of the strain of the wall at end-systole, RR, CC, LL, RC, RL, CL."""
@@ -93,4 +93,14 @@ def solved_heart(config: Config) -> SolvedBeat:
     beat = solved_cycle(equations, cycle, frames)
     equations.close()
     es = int(np.argmax(cycle.pressure / cycle.volume))
-    return SolvedBeat(config, unloaded, beat, previous, es, cycle.period, equations.assembly.displacement)
+    before = np.array([equations.assembly.displacement(one.state.solution) for one in previous])
+    return SolvedBeat(config, unloaded, beat, before, np.array([one.time for one in previous]), es, cycle.period)
+
+
+def stored_heart(config: Config, arrays: Arrays) -> SolvedBeat:
+    """A heart from the arrays of its group `mechanics`, if it is held at its base and no step was halved."""
+    cycle = heart_cycle(config)
+    beat = SolvedCycle(**{field.name: arrays[field.name] for field in fields(SolvedCycle)})
+    before = np.concatenate([beat.displacement[:1], beat.displacement[:-1]])
+    since = np.diff(arrays["time"], prepend=arrays["time"][0])
+    return SolvedBeat(config, unloaded_wall(config, cycle), beat, before, since, int(arrays["es_frame"]), cycle.period)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from echotruth.fem.quadrature import tetrahedron, triangle
 from echotruth.fem.tetrahedra import Floats, Integers, Mesh, shape, shape_gradient
@@ -15,6 +16,9 @@ from echotruth.report import style
 from echotruth.units import kPa, kPa_per_mm, kPa_s_per_mm
 from validation import energies, heart
 from validation.report import Report, Row
+
+N_MOTIONS = 8
+"""Random motions whose works tell the norm of a force within a quarter."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +54,17 @@ def measure(quick: bool = False) -> Results:
     return balance(heart.solved(*((6, 4, 1) if quick else heart.DEFAULT_MESH)))
 
 
+def residual(solved: heart.SolvedBeat) -> Floats:
+    """Force on the free nodes over that of the blood, (n_frames,): root mean square of the work of random motions."""
+    virtual_work, mesh, rng = _VirtualWork(solved), solved.wall.mesh, np.random.default_rng(0)
+    motions = rng.normal(size=(N_MOTIONS, *mesh.nodes.shape))
+    motions[:, np.unique(mesh.base)] = 0.0
+    frames = range(len(virtual_work.time))
+    works = np.array([[virtual_work.of_frame(frame, motion) for motion in motions] for frame in frames])
+    left = works[..., 1:].sum(axis=-1) - works[..., 0]
+    return np.sqrt(np.sum(left**2, axis=1) / np.sum(works[..., 0] ** 2, axis=1))
+
+
 def balance(solved: heart.SolvedBeat) -> Results:
     """Works of a solved heart."""
     virtual_work, displacement = _VirtualWork(solved), solved.beat.displacement
@@ -64,16 +79,16 @@ class _VirtualWork:
     """Virtual work of a solved heart, by energies implemented independently of its solver."""
 
     def __init__(self, solved: heart.SolvedBeat) -> None:
-        self.mesh, self.beat, self.previous_states = solved.wall.mesh, solved.beat, solved.previous_states
+        self.mesh, self.beat, self.tissue = solved.wall.mesh, solved.beat, solved.wall.tissue
+        self.before, self.since = solved.before, solved.since
         self.section, xi = solved.config.mechanics, tetrahedron()[0]
         self.right_pressure_ratio = solved.config.loop.right_pressure_ratio
-        self.tension_scale = solved.wall.tissue.tension_scale[:, None]
         dN_dX, volume = material_gradients(self.mesh, xi)
         self.volume = volume * tetrahedron()[1]
         frames = fibre_frames(self.mesh, solved.wall.depth, solved.config.fibres, xi, solved.config.seed)
         self.dN_dX = np.einsum("cqai,cqji->cqaj", dN_dX, frames)
         self.time = np.arange(len(self.beat.displacement)) * solved.period / len(self.beat.displacement)
-        self.frames, self.displacement = frames, solved.displacement
+        self.axes = np.swapaxes(frames, -1, -2)
 
     def gradient(self, displacement: Floats) -> Floats:
         """F - I, its columns along the fibre axes."""
@@ -82,17 +97,11 @@ class _VirtualWork:
     def of_frame(self, frame: int, change: Floats) -> tuple[float, ...]:
         """Work of the blood, of the passive, active, volumetric and viscous stress and of the surroundings, J, for a
         change (n_nodes, 3), m, of the displacement of a frame."""
-        u, beat = self.beat.displacement[frame], self.beat
-        step = 1j * energies.COMPLEX_STEP
-        f = np.swapaxes(self.frames, -1, -2) + self.gradient(u) + step * self.gradient(change)
-        parts = (
-            beat.stiffness * self._passive(f),
-            beat.active_tension[frame] * self._active(f, frame),
-            self._volumetric(f),
-            self._viscous(f, frame),
-        )
+        u, step = self.beat.displacement[frame], 1j * energies.COMPLEX_STEP
+        f = self.axes + self.gradient(u) + step * self.gradient(change)
+        parts = self._passive(f), self._active(f, frame), self._volumetric(f), self._viscous(f, frame)
         of_wall = (float(part.imag / energies.COMPLEX_STEP) for part in parts)
-        return self._blood(u, change, beat.pressure[frame]), *of_wall, self._surroundings(u, change, frame)
+        return self._blood(u, change, self.beat.pressure[frame]), *of_wall, self._surroundings(u, change, frame)
 
     def _blood(self, u: Floats, change: Floats, pressure: float) -> float:
         """Pressure times the derivative of the volume V(u + s change) by s, by differences: V is cubic in s.
@@ -111,32 +120,37 @@ class _VirtualWork:
         return cavity_volume(nodes, self.mesh.endo) + right
 
     def _passive(self, f: Floats) -> complex:
+        """Energy of the passive law and of scars, which are taut from end-diastole on."""
         local = self.section.pointwise_bulk_ratio / 2 * (energies.determinant(f) - 1) ** 2
-        return np.sum((energies.passive(f, self.section.material) + local) * self.volume)
+        energy = energies.passive(f, self.section.material) + local
+        energy = self.beat.stiffness * self.tissue.stiffness_scale[:, None] * energy
+        at_ed = self.axes + self.gradient(self.beat.displacement[0])
+        taut = self.tissue.taut_stiffness[:, None] / 2 * _squared_strain(f, at_ed)
+        return np.sum((energy + taut) * self.volume)
 
     def _active(self, f: Floats, frame: int) -> complex:
         """Energy of the tension, which the velocity of the fibres, that of the frame, lowers along them."""
         section = self.section.active
         power = 2.0 if section.stress == "cauchy" else 0.0
         shares = self._force_velocity(f.real, frame), section.sheet_share, section.normal_share
-        muscle = self.tension_scale * self.volume
+        muscle = self.beat.cell_tension[frame][:, None] * self.volume
         return sum(
             np.sum(share * energies.active(f, section.length_dependence, power, axis) * muscle)
             for axis, share in enumerate(shares)
         )
 
     def _force_velocity(self, f: Floats, frame: int) -> Floats:
-        previous, section = self.previous_states[frame], self.section.active
-        if previous.time <= 0 or section.shortening_velocity_max_per_s is None or self.beat.active_tension[frame] <= 0:
+        since, section = self.since[frame], self.section.active
+        if since <= 0 or section.shortening_velocity_max_per_s is None:
             return np.ones(f.shape[:2])
         now, before = (np.linalg.norm(g[..., 0], axis=-1) for g in (f, self._before(frame)))
-        velocity = (now - before) / previous.time / section.shortening_velocity_max_per_s
-        return energies.force_velocity(velocity, section.hill_curvature, section.eccentric_max)
+        velocity = (now - before) / since / section.shortening_velocity_max_per_s
+        force = energies.force_velocity(velocity, section.hill_curvature, section.eccentric_max)
+        return np.where(self.beat.cell_tension[frame][:, None] > 0, force, 1.0)
 
     def _before(self, frame: int) -> Floats:
         """F of the state before a frame."""
-        displacement = self.displacement(self.previous_states[frame].state.solution)
-        return np.swapaxes(self.frames, -1, -2) + self.gradient(displacement)
+        return self.axes + self.gradient(self.before[frame])
 
     def _volumetric(self, f: Floats) -> complex:
         """Energy of the mean dilatation of each cell."""
@@ -146,20 +160,17 @@ class _VirtualWork:
 
     def _viscous(self, f: Floats, frame: int) -> complex:
         """Potential of the viscous stress, viscosity / (2 dt) |E - E_previous|^2."""
-        previous = self.previous_states[frame]
-        if previous.time <= 0:
+        if self.since[frame] <= 0:
             return 0j
-        strain = (_right_cauchy_green(f) - _right_cauchy_green(self._before(frame))) / 2
-        viscosity = self.section.viscosity_Pa_s
-        return viscosity / (2 * previous.time) * np.sum(np.sum(strain**2, axis=(-2, -1)) * self.volume)
+        viscosity = self.section.viscosity_Pa_s / self.since[frame]
+        return viscosity / 2 * np.sum(_squared_strain(f, self._before(frame)) * self.volume)
 
     def _surroundings(self, u: Floats, change: Floats, frame: int) -> float:
         """Work against the pericardium, which rests at end-diastole, and against the springs of an elastic base."""
         pericardium, base = self.section.pericardium, self.section.elastic_base
         work, at_ed = 0.0, self.beat.displacement[0]
         if frame:
-            previous = self.previous_states[frame]
-            rate = (u - self.displacement(previous.state.solution)) / previous.time
+            rate = (u - self.before[frame]) / self.since[frame]
             traction = pericardium.spring_kPa_per_mm * kPa_per_mm * (u - at_ed)
             traction += pericardium.dashpot_kPa_s_per_mm * kPa_s_per_mm * rate
             work += _surface_work(self.mesh, self.mesh.epi, traction, change, None)
@@ -189,9 +200,10 @@ def _surface_work(mesh: Mesh, facets: Integers, traction: Floats, change: Floats
     return float(work)
 
 
-def _right_cauchy_green(f: Floats) -> Floats:
-    """C = F^T F of F of shape (..., 3, 3), real or complex."""
-    return np.swapaxes(f, -1, -2) @ f
+def _squared_strain(f: NDArray, since: Floats) -> NDArray:
+    """E : E of E = (F^T F - F_0^T F_0) / 2, shape (...), of F and F_0 of shape (..., 3, 3), real or complex."""
+    now, before = (np.swapaxes(one, -1, -2) @ one for one in (f, since))
+    return np.sum(((now - before) / 2) ** 2, axis=(-2, -1))
 
 
 def report(results: Results) -> Report:
