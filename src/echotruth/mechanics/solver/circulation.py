@@ -127,13 +127,14 @@ def _log(number: int, cavity: Cavity, change: float) -> None:
 
 
 def _fill(stepper: LoadStepper, volumes: Floats, tension: Floats, rested: SolvedFrame | None) -> None:
-    """Fill the heart at rest from end-diastole to the volume of another, from which a beat begins, with slack scars.
+    """Fill the heart at rest from end-diastole to the volume of another, from which a beat begins.
 
-    The last frame of a beat is not at rest. Where no way leads on from there, the heart is filled from the end-diastole
-    with which that beat began.
+    Meanwhile neither pericardium nor taut scars act; they are at rest where the beat begins. The last frame of a beat
+    is not at rest. Where no way leads on from there, the heart is filled from the end-diastole with which that beat
+    began.
     """
     stepper.circulation = None
-    stepper.tauten(False)
+    stepper.release()
     stepper.state = replace(stepper.state, cavity_pressure=stepper.load.pressure)
     load = Load(0.0, float(volumes[LEFT_VENTRICLE]), 0.0, tension, time=stepper.load.time)
     try:
@@ -143,7 +144,7 @@ def _fill(stepper: LoadStepper, volumes: Floats, tension: Floats, rested: Solved
             raise
         stepper.state, stepper.load = rested.state, replace(rested.load, time=load.time)
         stepper.advance(load, "cavity_pressure")
-    stepper.tauten(True)
+    stepper.rest()
     stepper.load = replace(stepper.load, time=0.0)
 
 

@@ -267,7 +267,6 @@ class Equilibrium:
         self._end_diastole: Floats | None = None
         self._previous_nodes, self._rate = mesh.nodes, 0.0
         self._previous_c = self._taut_c = np.zeros((*self.elements.weight.shape, 6))
-        self._is_taut = False
 
     def changed(
         self, law: element.WallLaw, stiffness_scale: Floats, springs: tuple[Springs, ...], taut: Floats
@@ -275,7 +274,7 @@ class Equilibrium:
         """The equations with other laws, stiffness and surroundings, before end-diastole; they share what is large."""
         other = copy(self)
         other.law, other.stiffness_scale, other.springs, other.taut = law, stiffness_scale, springs, taut
-        other._previous_c, other._end_diastole, other._is_taut = np.zeros_like(self._previous_c), None, False
+        other._previous_c, other._end_diastole = np.zeros_like(self._previous_c), None
         return other
 
     def set_previous(self, previous: PreviousState) -> None:
@@ -286,17 +285,15 @@ class Equilibrium:
         if self._rate:
             element.right_cauchy_green(self._previous_nodes, self.elements, self._previous_c)
 
-    def rest_at(self, state: State) -> None:
-        """Set the state of end-diastole, where the pericardium is at rest, and from which on scars are taut."""
-        self._end_diastole = self.positions(state)
-        self.tauten(state)
+    def rest_at(self, state: State | None) -> None:
+        """Set the state of end-diastole, where the pericardium is at rest, and from which on scars are taut.
 
-    def tauten(self, state: State | None) -> None:
-        """Let scars be taut from a state of end-diastole on; without one they are slack, as while the heart fills."""
-        self._is_taut = state is not None
-        if state is not None and self.taut.any():
+        Without one the heart fills: the pericardium does not act, and scars are slack.
+        """
+        self._end_diastole = None if state is None else self.positions(state)
+        if self._end_diastole is not None and self.taut.any():
             self._taut_c = np.empty_like(self._previous_c)
-            element.right_cauchy_green(self.positions(state), self.elements, self._taut_c)
+            element.right_cauchy_green(self._end_diastole, self.elements, self._taut_c)
 
     def close(self) -> None:
         """Free the memory of the factors."""
@@ -326,7 +323,7 @@ class Equilibrium:
         stiffness = state.stiffness * self.stiffness_scale
         tension = np.zeros(len(self.mesh.cells)) + state.tension * load.tension_fraction + load.tension
         velocity = self._rate, self._previous_c
-        taut = self.taut if self._is_taut else np.zeros_like(self.taut)
+        taut = np.zeros_like(self.taut) if self._end_diastole is None else self.taut
         cell_state = element.CellState(stiffness, tension, state.cell_pressure, *velocity, taut, self._taut_c)
         element.evaluate(nodes, self.elements, self.law, cell_state, response)
         gradient = cavity.volume_gradient(nodes, self.mesh.endo)

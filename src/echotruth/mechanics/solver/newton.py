@@ -153,15 +153,14 @@ class LoadStepper:
         return self.state
 
     def rest(self) -> None:
-        """Let the surroundings act from the last solved state on, at which they are at rest."""
+        """Let the pericardium and taut scars act from the last solved state on, at which they are at rest."""
         self.equations.rest_at(self.state)
         self._tangent = None
 
-    def tauten(self, is_taut: bool) -> None:
-        """Let scars be taut from the last solved state on, or slack."""
-        if self.equations.taut.any():
-            self.equations.tauten(self.state if is_taut else None)
-            self._tangent = None
+    def release(self) -> None:
+        """Let the pericardium and taut scars not act, as while the heart fills."""
+        self.equations.rest_at(None)
+        self._tangent = None
 
     def couple(self, circulation: Circulation, volumes: Floats) -> None:
         """Let the last solved state be that of end-diastole of a heart in a circulation, from which it goes on.
