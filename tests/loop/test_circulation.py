@@ -7,7 +7,7 @@ import pytest
 
 from echotruth.config import Loop
 from echotruth.config.loop import Circulation as Settings
-from echotruth.loop.calibration import CHAMBERS, calibrate
+from echotruth.loop.calibration import AORTIC_DROP, CHAMBERS, calibrate
 from echotruth.loop.circulation import (
     ARTERIES,
     LEFT_ATRIUM,
@@ -31,14 +31,15 @@ def circulation(name="mouse", frames=40):
 
 
 def beat(one, pressure, volumes=None):
-    """Volumes (n_frames + 1, 8) and pressures of a beat with given cavity pressures (n_frames,), from end-diastole."""
+    """Volumes (n_frames + 1, 8), pressures and arterial pressure of a beat with given cavity pressures (n_frames,)."""
     step, volumes = one.period / len(pressure), [one.volumes if volumes is None else volumes]
-    pressures = []
+    pressures, arterial = [], []
     for frame in range(1, len(pressure) + 1):
         passed = one.exchange(volumes[-1], frame * step, step, pressure[frame % len(pressure)])
         volumes.append(passed.volumes)
         pressures.append(passed.pressures)
-    return np.array(volumes), np.array(pressures)
+        arterial.append(passed.arterial_pressure)
+    return np.array(volumes), np.array(pressures), np.array(arterial)
 
 
 def weak(cycle, strength=0.6):
@@ -125,7 +126,7 @@ def test_slope_and_tangent_are_the_derivatives_of_the_step():
 def test_measured_loop_is_given_back(name, frames):
     cycle = read_loop(Loop(file=name, frames=frames))
     one, closed = calibrate(cycle, SETTINGS)
-    volumes, pressures = beat(one, cycle.pressure)
+    volumes, pressures, _ = beat(one, cycle.pressure)
     stroke = np.ptp(cycle.volume)
     np.testing.assert_allclose(volumes[:-1, LEFT_VENTRICLE], closed.volume, atol=1e-9 * stroke)
     np.testing.assert_allclose(volumes[-1], volumes[0], atol=1e-9 * stroke)
@@ -155,7 +156,7 @@ def test_pressures_and_resistances_are_those_of_mammals(name):
     & Westerhof 2009), larger in mice as their output is smaller; 14 +- 3 mmHg in the pulmonary artery, 0 to 5 in
     the right atrium, 15 to 30 at the height of the right ventricle; a right ventricle that ejects half and more."""
     one, cycle = circulation(name)
-    volumes, pressures = beat(one, cycle.pressure)
+    volumes, pressures, _ = beat(one, cycle.pressure)
     mean, highest = pressures.mean(axis=0) / MMHG, pressures.max(axis=0) / MMHG
     low, high = {"mouse": (200.0, 450.0), "rat": (80.0, 160.0), "human": (0.6, 1.3)}[name]
     assert low < 1 / one.conductance[ARTERIES] / MMHG / 1e6 < high
@@ -168,6 +169,26 @@ def test_pressures_and_resistances_are_those_of_mammals(name):
     assert 0.45 < 1 - right.min() / right.max() < 0.75
     # What the atria leave to the heads is small beside what fills the heart in people.
     assert np.abs(one.head[:, LEFT_ATRIUM]).max() / MMHG < 4
+
+
+@pytest.mark.parametrize(
+    ("name", "systole", "diastole"), [("mouse", (100, 115), (70, 90)), ("human", (105, 130), (70, 90))]
+)
+def test_arteries_have_the_pressures_of_the_root_of_the_aorta(name, systole, diastole):
+    """Below the ventricle by the drop of the valve while it is open, else above it, and pulsating as in life. The
+    reflex of the healthy heart keeps its mean."""
+    one, cycle = circulation(name)
+    volumes, pressures, arterial = beat(one, cycle.pressure)
+    flow = -np.diff(volumes[:, LEFT_VENTRICLE]) / (one.period / len(arterial))
+    ejects, drop = flow > 1e-9 * flow.max(), pressures[:, LEFT_VENTRICLE] - arterial
+    np.testing.assert_allclose(drop[ejects], one.aortic_valve * flow[ejects], atol=1e-9 * arterial.max())
+    assert drop[ejects].max() == pytest.approx(AORTIC_DROP * MMHG)
+    assert drop[~ejects].max() <= 0
+    assert systole[0] < arterial.max() / MMHG < systole[1]
+    assert diastole[0] < arterial.min() / MMHG < diastole[1]
+    assert arterial.mean() == pytest.approx(one.set_pressure)
+    _, steady = one.steady(Cavity(pressures[:, 0], volumes[1:, 0], pressures[:, 0] / volumes[1:, 0]), one.volumes)
+    assert steady.mean_arterial_pressure == pytest.approx(one.set_pressure, rel=1e-5)
 
 
 def test_steady_beat_does_not_depend_on_where_it_begins():
@@ -197,9 +218,9 @@ def test_reflex_defends_the_arterial_pressure():
     cavity, volume = weak(cycle, 0.4), np.roll(cycle.volume, -1)
     _, without = one.steady(cavity, one.volumes)
     answered, defended = replace(one, reflex=True).steady(cavity, one.volumes)
-    lost = one.set_pressure - without.mean_pressures[ARTERIES]
+    lost = one.set_pressure - without.mean_arterial_pressure
     assert lost > 5 * MMHG
-    assert 0 < one.set_pressure - defended.mean_pressures[ARTERIES] < 0.5 * lost
+    assert 0 < one.set_pressure - defended.mean_arterial_pressure < 0.5 * lost
     assert answered.conductance[ARTERIES] < one.conductance[ARTERIES]
     assert answered.unstressed[VEINS] < 0
     assert defended.volumes.sum() == pytest.approx(one.volumes.sum(), rel=1e-9)
@@ -221,15 +242,15 @@ def test_loop_with_noise_is_calibrated_too():
     noisy = cycle.volume + 0.002 * np.ptp(cycle.volume) * np.random.default_rng(3).standard_normal(60)
     noisy[0] = noisy.max()
     one, closed = calibrate(replace(cycle, volume=noisy), SETTINGS)
-    volumes, _ = beat(one, cycle.pressure)
+    volumes, _, _ = beat(one, cycle.pressure)
     np.testing.assert_allclose(volumes[:-1, 0], closed.volume, atol=1e-9 * np.ptp(noisy))
     assert np.abs(closed.volume - noisy).max() < 0.03 * np.ptp(noisy)
 
 
 def test_larger_heart_has_the_same_pressures():
     one, cycle = circulation()
-    small, pressures = beat(one, cycle.pressure)
-    large, same = beat(one.scaled(7.0), cycle.pressure)
+    small, pressures, _ = beat(one, cycle.pressure)
+    large, same, _ = beat(one.scaled(7.0), cycle.pressure)
     np.testing.assert_allclose(large, 7 * small, rtol=1e-12)
     np.testing.assert_allclose(same, pressures, rtol=1e-9)
 
@@ -261,5 +282,5 @@ def test_loop_of_too_few_frames_is_refused_in_a_sentence():
             assert f"mouse.csv: with {frames} frames the loop has none of" in str(error)
             assert frames < 8
         else:
-            volumes, _ = beat(one, cycle.pressure)
+            volumes, _, _ = beat(one, cycle.pressure)
             np.testing.assert_allclose(volumes[:-1, 0], closed.volume, atol=1e-9 * np.ptp(closed.volume))

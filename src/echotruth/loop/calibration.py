@@ -2,8 +2,8 @@
 
 The resistance and compliance of the arteries follow from the loop, the other compartments from published pressures and
 from Regazzoni et al., scaled by stroke volume and period. With the measured flows through the left ventricle the ring
-then comes to its steady beat; the heads of the two valves are what that leaves of the measured pressure: in ejection
-reflected waves and the inertia of the blood, in filling what the atrium has not.
+then comes to its steady beat; the two heads are what that leaves of the measured pressure: in ejection, of that behind
+the aortic valve, reflected waves and the inertia of the blood; in filling what the atrium has not.
 """
 
 from dataclasses import replace
@@ -85,6 +85,10 @@ PULMONARY_COMPLIANCE = {
 VALVE_DROP, PULMONARY_VEIN_DROP = 0.0075 * REFERENCE_STROKE_VOLUME / 0.8, 0.0015 * REFERENCE_STROKE_VOLUME / 0.8
 """Pressure, mmHg, that drives the mean flow through a valve of the right heart, and from the lung into the atrium."""
 
+AORTIC_DROP = 4.0
+"""Pressure, mmHg, lost in the aortic valve by the fastest ejection of the healthy heart: that of blood at 1 m/s, 4 v^2.
+In healthy people it is below 1.5 m/s (ACC/AHA guidelines 2006, J Am Coll Cardiol 48, e1)."""
+
 VENOUS_COMPLIANCE = 60.0
 """Compliance of the systemic veins over that of the arteries (conscious rats; Yamamoto, Trippodo, Ishise & Frohlich,
 Am J Physiol 238 (1980) H823). The people of Zenker et al. have 111 mL/mmHg, some 55 times the arteries here."""
@@ -127,10 +131,12 @@ def calibrate(cycle: Cycle, settings: Settings) -> tuple[Circulation, Cycle]:
     ejects, fills = outflow > 0, inflow > 0
     mitral_resistance = settings.mitral_gradient_mmHg * mmHg / inflow.max()
     behind = pressure + mitral_resistance * inflow
-    ring = _healthy(cycle, pressure, outflow, float(behind[fills].mean()), settings)
+    aortic_valve = AORTIC_DROP * mmHg / outflow.max()
+    root = pressure - aortic_valve * outflow
+    ring = _healthy(cycle, root, outflow, float(behind[fills].mean()), settings)
     steady, pressures = _beat_of_flows(ring, outflow, inflow, np.where(fills, behind, np.nan))
     characteristic = settings.characteristic_share / ring.conductance[ARTERIES]
-    ejecting = pressure - characteristic * outflow - pressures[:, ARTERIES]
+    ejecting = root - characteristic * outflow - pressures[:, ARTERIES]
     filling = behind - pressures[:, LEFT_ATRIUM]
     head, conductance = np.zeros((len(volume), 8)), ring.conductance.copy()
     # Where a valve is shut, the head is between those of its last flow and the next, and keeps it so.
@@ -138,12 +144,13 @@ def calibrate(cycle: Cycle, settings: Settings) -> tuple[Circulation, Cycle]:
     head[:, LEFT_VENTRICLE] = -np.maximum(_held(ejecting, ejects), np.where(ejects, -np.inf, shut))
     shut = pressure - pressures[:, LEFT_ATRIUM]
     head[:, LEFT_ATRIUM] = np.minimum(_between(filling, fills), np.where(fills, np.inf, shut))
-    conductance[LEFT_VENTRICLE], conductance[LEFT_ATRIUM] = 1 / characteristic, 1 / mitral_resistance
+    conductance[LEFT_VENTRICLE] = 1 / (aortic_valve + characteristic)
+    conductance[LEFT_ATRIUM] = 1 / mitral_resistance
     volumes = steady.copy()
     volumes[LEFT_VENTRICLE] = volume[0]
-    mean = float(pressures[:, ARTERIES].mean())
-    circulation = replace(ring, head=head, conductance=conductance, volumes=volumes, set_pressure=mean)
-    return circulation, replace(cycle, volume=volume)
+    mean = float(np.where(ejects, root, np.maximum(pressure, pressures[:, ARTERIES])).mean())
+    given = {"head": head, "conductance": conductance, "aortic_valve": aortic_valve, "set_pressure": mean}
+    return replace(ring, volumes=volumes, **given), replace(cycle, volume=volume)
 
 
 def closed_valves(cycle: Cycle) -> Floats:
@@ -171,13 +178,14 @@ def closed_valves(cycle: Cycle) -> Floats:
     return closed
 
 
-def _healthy(cycle: Cycle, pressure: Floats, outflow: Floats, filling: float, settings: Settings) -> Circulation:
+def _healthy(cycle: Cycle, root: Floats, outflow: Floats, filling: float, settings: Settings) -> Circulation:
     """The compartments outside the left ventricle, whose valves are open to given flows alone.
 
     Parameters
     ----------
     cycle : Cycle
-    pressure : ndarray of shape (n_frames,), Pa
+    root : ndarray of shape (n_frames,), Pa
+        Pressure behind the aortic valve while it is open.
     outflow : ndarray of shape (n_frames,), m^3/s
     filling : float, Pa
         Mean pressure behind the mitral valve while it is open.
@@ -190,7 +198,7 @@ def _healthy(cycle: Cycle, pressure: Floats, outflow: Floats, filling: float, se
     gained = kept * step / decay_time
     windkessel = _periodic(kept, gained, outflow) + settings.characteristic_share * outflow
     # Of a peripheral resistance of one: all pressures above those of the veins grow with it.
-    ejects, above = outflow > 0, pressure - VENOUS_PRESSURE * mmHg
+    ejects, above = outflow > 0, root - VENOUS_PRESSURE * mmHg
     resistance = float(np.sum(above[ejects] * windkessel[ejects]) / np.sum(windkessel[ejects] ** 2))
     compliance = decay_time / resistance
     elastance, unstressed = np.zeros((number, 8)), np.zeros(8)
@@ -209,7 +217,7 @@ def _healthy(cycle: Cycle, pressure: Floats, outflow: Floats, filling: float, se
     conductance[ARTERIES] = 1 / resistance
     nothing, volumes = np.zeros((number, 8)), np.ones(8) * stroke_volume
     volumes[ARTERIES] = compliance * resistance * flow
-    return Circulation(cycle.period, elastance, nothing, unstressed, conductance, volumes, stroke_volume, 0.0)
+    return Circulation(cycle.period, elastance, nothing, unstressed, conductance, 0.0, volumes, stroke_volume, 0.0)
 
 
 def _beat_of_flows(ring: Circulation, outflow: Floats, inflow: Floats, behind: Floats) -> tuple[Floats, Floats]:

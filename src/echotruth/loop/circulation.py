@@ -10,12 +10,19 @@ Blood goes round, from the left ventricle back into it (after Regazzoni et al., 
     dV_i/dt = q_(i-1) - q_i.
 
 Valves are behind 0, 3, 4 and 7. Vessels have an elastance 1 / C and no V0, so that V is their stressed volume; that of
-right ventricle and atria changes as a cosine. The heads h are zero but for those of the valves of the left ventricle,
-which the measured loop gives (:mod:`.calibration`), and which stay the same in disease.
+right ventricle and atria changes as a cosine. The heads h are zero but for those of the flow out of the left ventricle
+and into it, which the measured loop gives (:mod:`.calibration`), and which stay the same in disease.
+
+On its way into the compliance of the arteries blood passes the aortic valve, of resistance R_v, and the root of the
+aorta, of characteristic resistance Z: 1 / G_0 = R_v + Z. The head h_0 is the arteries' own: reflected waves and the
+inertia of the blood. So the arterial pressure, that of the root, is
+
+    P_a = P_0 - R_v q_0 = P_1 + Z q_0 - h_0           while blood passes the valve,
+    P_a = max(P_0, P_1)                               else: until it is accelerated, the root follows the ventricle.
 
 Time goes in implicit Euler steps of a frame or a part of it. What leaves a compartment enters the next, so that the
 volume of all is constant but for round-off; `retained` fluid is added to it once. The arterial baroreflex answers the
-mean pressure of the arteries of a beat:
+mean P of the arterial pressure of a beat:
 
     S = 1 / (1 + exp(k (P - P_healthy))),    R / R_healthy = .4 + 1.2 S,    V0_2 = (.5 - S) U
 
@@ -77,12 +84,15 @@ class Exchange(NamedTuple):
         Derivative of the volumes by those at its beginning.
     pressures : ndarray of shape (8,), Pa
         At its end.
+    arterial_pressure : float, Pa
+        In the root of the aorta, at its end.
     """
 
     volumes: Floats
     slope: float
     tangent: Floats
     pressures: Floats
+    arterial_pressure: float
 
 
 class Cavity(NamedTuple):
@@ -107,10 +117,13 @@ class Steady(NamedTuple):
     volumes : ndarray of shape (8,), m^3
         At end-diastole.
     mean_pressures : ndarray of shape (8,), Pa
+    mean_arterial_pressure : float, Pa
+        In the root of the aorta.
     """
 
     volumes: Floats
     mean_pressures: Floats
+    mean_arterial_pressure: float
 
 
 @dataclass(frozen=True)
@@ -127,12 +140,14 @@ class Circulation:
         V0.
     conductance : ndarray of shape (8,), m^3/(Pa s)
         G of the flow out of each compartment.
+    aortic_valve : float, Pa s/m^3
+        R_v.
     volumes : ndarray of shape (8,), m^3
         At end-diastole of the healthy heart, with which the first beat begins.
     stroke_volume : float, m^3
         Of the healthy heart.
     set_pressure : float, Pa
-        Mean pressure of the healthy arteries.
+        Mean arterial pressure of the healthy circulation.
     reflex : bool
         Whether the baroreflex acts.
     """
@@ -142,6 +157,7 @@ class Circulation:
     head: Floats
     unstressed: Floats
     conductance: Floats
+    aortic_valve: float
     volumes: Floats
     stroke_volume: float
     set_pressure: float
@@ -193,7 +209,10 @@ class Circulation:
         flows = conductance * (_DIFFERENCE @ pressures + head) + duration * added
         after = volumes + _DIVERGENCE @ flows
         slope = float(inverse[LEFT_VENTRICLE] @ by_pressure[:, LEFT_VENTRICLE])
-        return Exchange(after, slope, inverse, pressures)
+        outflow, before_valve = float(flows[LEFT_VENTRICLE]) / duration, float(pressures[LEFT_VENTRICLE])
+        shut = max(before_valve, float(pressures[ARTERIES]))
+        root = before_valve - self.aortic_valve * outflow if outflow > 0 else shut
+        return Exchange(after, slope, inverse, pressures, root)
 
     def pressures(self, volumes: Floats, time: float, pressure: float) -> Floats:
         """Pressures (8,), Pa, at volumes (8,), m^3, with that of the left ventricle given."""
@@ -208,6 +227,7 @@ class Circulation:
             elastance=self.elastance / factor,
             unstressed=self.unstressed * factor,
             conductance=self.conductance * factor,
+            aortic_valve=self.aortic_valve / factor,
             volumes=self.volumes * factor,
             stroke_volume=self.stroke_volume * factor,
         )
@@ -250,7 +270,7 @@ class Circulation:
         def excess(activity: float) -> float:
             nonlocal beat
             beat = _steady(self.answered(activity), cavity, beat.volumes)
-            pressure = beat.mean_pressures[ARTERIES]
+            pressure = beat.mean_arterial_pressure
             return activity - 1 / (1 + np.exp(REFLEX_STEEPNESS * (pressure - self.set_pressure)))
 
         activity = float(brentq(excess, 0.0, 1.0, xtol=1e-4))
@@ -282,14 +302,15 @@ def _steady(circulation: Circulation, cavity: Cavity, volumes: Floats) -> Steady
     step = circulation.period / number
     offset = cavity.pressure - cavity.elastance * cavity.volume
     for _ in range(_MAX_NEWTON_STEPS):
-        state, tangent, mean = volumes, np.eye(8), np.zeros(8)
+        state, tangent, mean, arterial = volumes, np.eye(8), np.zeros(8), 0.0
         for k in range(number):
             passed = circulation.exchange(state, (k + 1) * step, step, offset[k], cavity.elastance[k])
             state, tangent, mean = passed.volumes, passed.tangent @ tangent, mean + passed.pressures / number
+            arterial += passed.arterial_pressure / number
         # What all contain does not change.
         matrix = np.vstack([tangent - np.eye(8), np.ones(8)])
         change = np.linalg.lstsq(matrix, np.append(volumes - state, 0.0), rcond=None)[0]
         if np.abs(change).max() < 1e-6 * circulation.stroke_volume:
-            return Steady(volumes, mean)
+            return Steady(volumes, mean, arterial)
         volumes = volumes + change
     raise LoopError("The circulation has no steady beat: change the heart or loop.circulation less.")

@@ -75,6 +75,8 @@ def unsolved(config: Config, displacement: Floats, n_cells: int, es: int, phase:
     return {
         "time": frame_times(config.loop),
         **dict.fromkeys(undefined, np.full(frames, np.nan)),
+        "compartment_pressure": np.full((frames, 8), np.nan),
+        "compartment_volume": np.full((frames, 8), np.nan),
         "cell_tension": np.full((frames, n_cells), np.nan, np.float32),
         "displacement": displacement,
         "stiffness": np.array(np.nan),

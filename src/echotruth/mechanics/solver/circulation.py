@@ -24,7 +24,7 @@ from echotruth.loop.circulation import (
     Circulation,
 )
 from echotruth.mechanics.solver.activation import Activation
-from echotruth.mechanics.solver.cycle import SolvedCycle, SolvedFrame, extrapolated
+from echotruth.mechanics.solver.cycle import SolvedCycle, SolvedFrame, extrapolated, solved_frame
 from echotruth.mechanics.solver.element import fibre_stretch
 from echotruth.mechanics.solver.equilibrium import Load, State
 from echotruth.mechanics.solver.newton import TOLERANCE, Diverged, LoadStepper, linear_combination
@@ -105,9 +105,9 @@ def steady_beat(
         begun = steady.volumes if change < last / 2 else (begun + steady.volumes) / 2
         last = change
         if change < STEADY and stepper.tolerance == TOLERANCE:
-            means = steady.mean_pressures[[ARTERIES, RIGHT_ATRIUM, PULMONARY_ARTERIES, LEFT_ATRIUM]] / 1e3
+            means = steady.mean_pressures[[RIGHT_ATRIUM, PULMONARY_ARTERIES, LEFT_ATRIUM]] / 1e3
             text = "mean pressures: arteries %.4g, right atrium %.3g, pulmonary arteries %.3g, left atrium %.3g kPa"
-            logger.info(text, *means)
+            logger.info(text, steady.mean_arterial_pressure / 1e3, *means)
             return frames[:-1]
         stepper.tolerance = TOLERANCE if change < NEAR else ROUGH_TOLERANCE
     remedy = "raise loop.circulation.beats_max, or change the heart less"
@@ -152,7 +152,7 @@ def _beat(
     stepper: LoadStepper, circulation: Circulation, activation: Activation, before: Sequence[State]
 ) -> list[SolvedFrame]:
     """The frames of a beat from end-diastole to end-diastole; `before` are the states of the beat before, if any."""
-    states, frames = [stepper.state], [_solved(stepper)]
+    states, frames = [stepper.state], [solved_frame(stepper)]
     equations, twitch = stepper.equations, activation.twitch
     for frame in range(1, len(twitch) + 1):
         stretch = fibre_stretch(equations.positions(stepper.state), equations.elements)
@@ -161,13 +161,8 @@ def _beat(
         state = stepper.advance(load, "cavity_pressure", _predicted(states, before))
         stepper.state = replace(state, tension=float(twitch[frame % len(twitch)]))
         states.append(stepper.state)
-        frames.append(_solved(stepper))
+        frames.append(solved_frame(stepper))
     return frames
-
-
-def _solved(stepper: LoadStepper) -> SolvedFrame:
-    pressure = float(stepper.pressures[ARTERIES])
-    return SolvedFrame(stepper.state, stepper.load, stepper.factorizations, stepper.max_error, pressure)
 
 
 def _predicted(states: Sequence[State], before: Sequence[State]) -> tuple[State, ...]:

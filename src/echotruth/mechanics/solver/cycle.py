@@ -51,14 +51,18 @@ class SolvedFrame(NamedTuple):
     max_error : float
         Largest relative residual of force, cavity volume and cell volumes.
     arterial_pressure : float, Pa
-        Of the circulation; not a number without one.
+        In the root of the aorta; not a number without a circulation.
+    compartment_pressure, compartment_volume : ndarray of shape (8,), Pa and m^3
+        Of the circulation; not numbers without one.
     """
 
     state: State
     load: Load
     factorizations: int
     max_error: float
-    arterial_pressure: float = np.nan
+    arterial_pressure: float
+    compartment_pressure: Floats
+    compartment_volume: Floats
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,10 @@ class SolvedCycle:
         Largest relative residual of force, cavity volume and cell volumes.
     stiffness : float, Pa
     arterial_pressure : ndarray of shape (n_frames,), Pa
-        Of the compliance of the arteries; not a number without a circulation.
+        In the root of the aorta; not a number without a circulation.
+    compartment_pressure, compartment_volume : ndarray of shape (n_frames, 8), Pa and m^3
+        Of the compartments of the circulation, in their order (:mod:`echotruth.loop.circulation`); not a number without
+        one.
     """
 
     displacement: Floats
@@ -97,6 +104,8 @@ class SolvedCycle:
     residual: Floats
     stiffness: float
     arterial_pressure: Floats
+    compartment_pressure: Floats
+    compartment_volume: Floats
 
 
 def solve(
@@ -219,7 +228,13 @@ def solved_frames(stepper: LoadStepper, cycle: Cycle, tension_scale: Floats) -> 
             text = "frame %d of %d, %.4g ms: %.2f kPa, %.4g uL, T_Ca %.2f kPa, %d factorizations"
             logger.info(text, frame, len(cycle.time), time * 1e3, *loads, stepper.factorizations - before)
         states.append(stepper.state)
-        yield SolvedFrame(stepper.state, stepper.load, stepper.factorizations, stepper.max_error)
+        yield solved_frame(stepper)
+
+
+def solved_frame(stepper: LoadStepper) -> SolvedFrame:
+    """The frame that a stepper has solved last."""
+    circulation = stepper.arterial_pressure, stepper.pressures, stepper.volumes
+    return SolvedFrame(stepper.state, stepper.load, stepper.factorizations, stepper.max_error, *circulation)
 
 
 def overstrained(cycle: Cycle, tension: Floats, cross_fibre: Floats) -> str:
@@ -279,6 +294,8 @@ def solved_cycle(equations: Equilibrium, cycle: Cycle, frames: Sequence[SolvedFr
         residual=np.array([frame.max_error for frame in frames]),
         stiffness=frames[0].state.stiffness,
         arterial_pressure=np.array([frame.arterial_pressure for frame in frames]),
+        compartment_pressure=np.array([frame.compartment_pressure for frame in frames]),
+        compartment_volume=np.array([frame.compartment_volume for frame in frames]),
     )
 
 

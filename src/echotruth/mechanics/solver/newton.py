@@ -20,7 +20,7 @@ import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.fem.sparse import SingularMatrix
-from echotruth.loop.circulation import LEFT_VENTRICLE, Circulation
+from echotruth.loop.circulation import ARTERIES, LEFT_VENTRICLE, Circulation
 from echotruth.mechanics.solver.equilibrium import (
     Correction,
     Equilibrium,
@@ -89,6 +89,8 @@ class LoadStepper:
         Last solved state, and the load that it balances.
     volumes, pressures : ndarray of shape (8,), m^3 and Pa
         Of the compartments of the circulation, at the last solved state; not numbers without one.
+    arterial_pressure : float, Pa
+        In the root of the aorta, likewise.
     tolerance : float
         Relative residual at which a state counts as solved.
     max_error : float
@@ -104,6 +106,7 @@ class LoadStepper:
         self.load = Load(0.0, equations.volume(self.state))
         self.circulation: Circulation | None = None
         self.volumes, self.pressures = np.full(8, np.nan), np.full(8, np.nan)
+        self.arterial_pressure = np.nan
         self.tolerance = TOLERANCE
         self.max_error = 0.0
         self.on_step: Callable[[Step], None] | None = None
@@ -143,6 +146,7 @@ class LoadStepper:
             if self.circulation:
                 passed = self.circulation.exchange(self.volumes, target.time, duration, self.state.cavity_pressure)
                 self.volumes, self.pressures = passed.volumes, passed.pressures
+                self.arterial_pressure = passed.arterial_pressure
             if self.on_step:
                 self.on_step(Step(start, load, fraction, fraction + step, unknown, before, self.state))
             fraction, predictors = fraction + step, ()
@@ -173,6 +177,7 @@ class LoadStepper:
         """
         self.circulation, self.volumes = circulation, volumes
         self.pressures = circulation.pressures(volumes, self.load.time, self.load.pressure)
+        self.arterial_pressure = float(self.pressures[ARTERIES])  # behind a shut valve
 
     def _filled(self, time: float, duration: float) -> Callable[[float], VolumeTarget] | None:
         """Volume after a step that ends at a time, by the pressure, if there is a circulation."""
