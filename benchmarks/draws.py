@@ -2,7 +2,7 @@
 
     python benchmarks/draws.py mouse rat human --hearts 50
 
-Prints a line a heart, of seven and two seconds of CPU time, and the sum of each species.
+Prints a line a heart, of ten and three seconds of CPU time, and the sum of each species.
 """
 
 from __future__ import annotations

@@ -133,10 +133,11 @@ class _VirtualWork:
         section = self.section.active
         power = 2.0 if section.stress == "cauchy" else 0.0
         shares = self._force_velocity(f.real, frame), section.sheet_share, section.normal_share
+        dependences = section.length_dependence, 0.0, 0.0
         muscle = self.beat.cell_tension[frame][:, None] * self.volume
         return sum(
-            np.sum(share * energies.active(f, section.length_dependence, power, axis) * muscle)
-            for axis, share in enumerate(shares)
+            np.sum(share * energies.active(f, dependence, power, axis) * muscle)
+            for axis, (share, dependence) in enumerate(zip(shares, dependences, strict=True))
         )
 
     def _force_velocity(self, f: Floats, frame: int) -> Floats:

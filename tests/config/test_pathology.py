@@ -26,7 +26,7 @@ BAD = [
 
 def test_preset_of_a_disease_sets_growth_and_load_but_not_what_is_given():
     thick = validate({"pathology": {"preset": "hypertension"}}, "a.yaml")
-    assert thick.geometry.hypertrophy == 1.2
+    assert thick.geometry.hypertrophy == 1.3
     assert (thick.loop.kind, thick.loop.circulation.baroreflex) == ("circulation", False)
     wide = {name: Config(geometry={"preset": name}, pathology={"preset": "dcm"}) for name in ("mouse", "human")}
     assert wide["mouse"].loop.circulation.contractility < wide["human"].loop.circulation.contractility < 1

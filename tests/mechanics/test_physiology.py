@@ -233,7 +233,7 @@ VIOLATIONS = [
     ({"twist": np.radians([0, 12, -61])}, "twist (deg) is 61 and must be at most 40 (physiology.twist_max_deg)"),
     ({"volume_ratio_min": -0.1}, "det F of all points and frames is -0.1 and must be at least 0.2"),
     ({"volume_ratio_min": np.nan}, "det F of all points and frames is not a number and must be at least 0.2"),
-    ({"volume_change_rms": 0.14}, "det F - 1 at end-systole is 0.14 and must be at most 0.03"),
+    ({"volume_change_rms": 0.14}, "det F - 1 at end-systole is 0.14 and must be at most 0.06"),
     ({"loop_error": 0.02}, "error of pressure or volume is 0.02 and must be at most 0.005"),
     ({"tension_min": -3e3}, "smallest active tension (kPa) is -3 and must be at least -1"),
     ({"active_tension": 1e3 * np.array([0, 40, 10, 40, 10, 0])}, "one rise and fall is 1.75 and must be at most 1.5"),
@@ -396,8 +396,11 @@ def test_a_heart_whose_apex_beats_before_it_ejects_is_implausible():
     assert circumferential[0] > 0.04 and circumferential[-1] < -0.09
     assert fibre[0] > 0.03 and fibre[-1] < -0.09
     assert found["fibre_shortening_rate"] > 10
-    assert "the largest mean of E_CC over a level" in violated(found, Physiology())
-    by_level = {bound.key: None for bound in BOUNDS if bound.key.startswith(("level_", "segment_", "fibre_shortening"))}
+    thickens = {"radial_strain_ivc_max": None}
+    assert "the largest mean of E_CC over a level" in violated(found, Physiology(**thickens))
+    by_level = thickens | {
+        bound.key: None for bound in BOUNDS if bound.key.startswith(("level_", "segment_", "fibre_shortening"))
+    }
     assert violated(found, Physiology(**by_level)) == ""
 
 
@@ -469,7 +472,7 @@ def test_the_heart_of_a_species_moves_as_measured_in_life(species):
     assert found["fibre_shortening_rate"] < {"mouse": 5.5, "rat": 4.0, "human": 2.0}[config.geometry.preset]
     # 0.2 by depth and level, and 0.12 by which the walls differ around the ventricle.
     assert found["fibre_strain_spread"] < np.hypot(0.2, 0.12)
-    assert found["untwist_ivr"] > 0.2
+    assert found["untwist_ivr"] > {"mouse": 0.3, "rat": 0.2, "human": 0.1}[config.geometry.preset]
     assert np.all(np.diff(found["layer_strain_es"][:, 0]) < 0)
     assert np.abs(found["layer_strain_ivc"][:, 3:5]).max() < 0.08
     assert np.abs(es[3:5]).max() < 0.05

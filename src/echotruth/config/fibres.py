@@ -17,13 +17,12 @@ class Fibres(Section):
     endo_deg: Angle = 80.0
     """Helix angle at the endocardium: from the circumferential direction, positive towards the base. DT-MRI of mice has
     52 +- 5 deg, and -41 +- 3 at the epicardium (Angeli 2014, doi 10.1186/s12968-014-0077-x), averaged over depth;
-    docs/physiology.md says why these defaults. `rat`: 80 and -41, `human`: 72 and -52; the paper: 84 and -42."""
-    epi_deg: Angle = -42.0
+    docs/physiology.md says why these defaults. `human`: 72 and -55; the paper: 84 and -42."""
+    epi_deg: Angle = -38.0
     """Helix angle at the epicardium."""
-    transverse_endo_deg: TransverseAngle = -1.5
-    """Transverse angle at the endocardium: of the fibre seen along the long axis, positive outwards. A small one keeps
-    the layers from shearing in isovolumic contraction (Bovendeerd 2009, Am J Physiol 297, H1058)."""
-    transverse_epi_deg: TransverseAngle = -1.5
+    transverse_endo_deg: TransverseAngle = 0.0
+    """Transverse angle at the endocardium: of the fibre seen along the long axis, positive outwards."""
+    transverse_epi_deg: TransverseAngle = 0.0
     """Transverse angle at the epicardium."""
     sheet_endo_deg: Angle = 0.0
     """Sheet angle at the endocardium: rotation about the fibre, 0 if sheets are parallel to the wall, positive

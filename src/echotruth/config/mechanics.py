@@ -12,23 +12,25 @@ NotNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
 class Active(Section):
-    """Active tension along the fibres, T_a = h T_Ca [1 + beta (lambda - 1)], with the force-velocity relation h."""
+    """Active tension along the fibres, T_a = h T_Ca [1 + beta (lambda - 1)], with the force-velocity relation h, and
+    shares of T_Ca across them."""
 
-    length_dependence: Annotated[FiniteFloat, Field(ge=0, le=5)] = 1.4
-    """beta: growth of T_a with the stretch from the unloaded wall, in every heart."""
+    length_dependence: Annotated[FiniteFloat, Field(ge=0, le=5)] = 2.0
+    """beta: growth of T_a with the stretch along the fibre from the unloaded wall, in every heart. The paper has 1.4,
+    the human model of Land et al. 2.3 (J Mol Cell Cardiol 106 (2017) 68; recalled)."""
     stress: Literal["cauchy", "second_piola_kirchhoff"] = "cauchy"
     """Meaning of T_a: the paper's tension per deformed area (S_ff = T_a / lambda^2), or S_ff itself."""
-    sheet_share: Fraction = 0.43
-    """Share of the tension that acts along the sheet direction too, by the stretch there, since fibres are dispersed. A
-    share of 0.4 across the fibre in the wall brings a sheep's heart closest to its tagged MRI (Walker 2005, Am J
-    Physiol 289, H692). `rat` 0.38, `human` 0.3."""
+    sheet_share: Fraction = 0.32
+    """Share of T_Ca that acts along the sheet direction too, per deformed area, since fibres are dispersed: it does not
+    grow with the stretch there. A share of 0.4 across the fibre in the wall brings a sheep's heart closest to its
+    tagged MRI (Walker 2005, Am J Physiol 289, H692). `human` 0.28."""
     normal_share: Fraction = 0.2
-    """Share of the tension that acts along the sheet normal too, likewise. `human` 0.18."""
-    shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 15.0
-    """Velocity, in unloaded lengths per second, at which shortening muscle bears no load. `rat` 12, `human` 8. `null`:
-    the tension does not depend on the velocity, as in the paper. Muscle gives most power at about a third of it, and
-    hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart shortens by 1.6 per second at most): the
-    default mouse ejects at 4.0 per second, rat at 2.5, human at 1.2."""
+    """Share of T_Ca that acts along the sheet normal too, likewise."""
+    shortening_velocity_max_per_s: Annotated[FiniteFloat, Field(gt=0)] | None = 12.0
+    """Velocity, in unloaded lengths per second, at which shortening muscle bears no load. `rat` 7.5, `human` 3.6.
+    `null`: the tension does not depend on the velocity, as in the paper. Muscle gives most power at about a third of
+    it, and hearts eject near there (ter Keurs 2012, PMC3568939, whose human heart shortens by 1.6 per second at most):
+    these are three times the velocity at which the default hearts eject."""
     hill_curvature: Annotated[FiniteFloat, Field(gt=0, le=10)] = 0.5
     """Curvature a / F_0 of the force-velocity relation: 0.5 in the model of cardiac muscle of Hunter, McCulloch & ter
     Keurs (Prog Biophys Mol Biol 69 (1998) 289)."""
@@ -36,12 +38,11 @@ class Active(Section):
     """Force to which that of muscle tends which is stretched ever faster, over the isometric one: 2 + a / F_0 in the
     same model."""
 
-    length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 16.0
+    length_sensitivity: Annotated[FiniteFloat, Field(ge=0, le=50)] = 12.0
     """Besides beta, growth dln T / dlambda of the tension with the stretch beyond that of the healthy heart, as long
-    after activation, in `loop.kind: circulation`. `human` 10: that of half activated muscle in the human model of Land
-    et al. (J Mol Cell Cardiol 106 (2017) 68). With it the late wall of a left bundle branch block stretches the septum
-    again, as in patients; the mouse's 16 is chosen for that, and is near what that model has at low activation (both
-    recalled)."""
+    after activation, in `loop.kind: circulation`. `human` 5. The human model of Land et al. (J Mol Cell Cardiol
+    106 (2017) 68) has 4.7 at half activation and 11 at a tenth. With it the late wall of a left bundle branch block
+    overtakes the septum, and the muscle away from an infarct does not shorten more than the healthy one."""
 
 
 class Pericardium(Section):

@@ -87,7 +87,16 @@ def active_stress(c: float, previous_c: float, rate: float, law: ActiveLaw) -> t
     force, slope = 1.0, 0.0
     if rate > 0:
         force, slope = force_velocity((stretch - sqrt(previous_c)) * rate, law)
-    per_area = 1 / c if law.power == 2 else stretch**-law.power  # a power takes as long as all else here
+    per_area, falls = deformed_area(c, law)
     isometric = (1 + law.length_dependence * (stretch - 1)) * per_area
-    growth = law.length_dependence * per_area - law.power * isometric / stretch
-    return force * isometric, (force * growth + slope * rate * isometric) / stretch
+    growth = law.length_dependence * per_area / stretch + (1 + law.length_dependence * (stretch - 1)) * falls
+    return force * isometric, force * growth + slope * rate * isometric / stretch
+
+
+@njit(cache=True, error_model="numpy")
+def deformed_area(c: float, law: ActiveLaw) -> tuple[float, float]:
+    """Second Piola-Kirchhoff stress 1 / lambda^power of a tension of one along an axis, and its tangent by the strain.
+
+    `c` is the square of the stretch lambda along the axis."""
+    per_area = 1 / c if law.power == 2 else c ** (-law.power / 2)  # a power takes as long as all else here
+    return per_area, -law.power * per_area / c

@@ -50,7 +50,7 @@ REFACTOR_COST = 15
 
 _MAX_NEWTON_STEPS = 25
 _MIN_DAMPING = 1 / 16
-_MIN_LOAD_STEP = 1 / 128
+_MIN_LOAD_STEP = 1 / 1024
 _REMEDY = "use a finer mesh or more frames"
 
 
@@ -298,4 +298,6 @@ def _broyden_update(correction: Correction, corrections: list[Correction]) -> Co
 
 def _at(load: Load, unknown: Unknown) -> str:
     pressure, volume = f"a pressure of {load.pressure / 1e3:.3g} kPa", f"a volume of {load.volume * 1e9:.4g} uL"
+    if unknown == "cavity_pressure" and load.time:  # in a circulation the volume is not known
+        return f"{1e3 * load.time:.4g} ms after end-diastole"
     return "at " + {None: pressure, "cavity_pressure": volume}.get(unknown, f"{pressure} and {volume}")

@@ -12,7 +12,7 @@ from numba import njit
 
 from echotruth.arrays import Floats
 from echotruth.mechanics.solver import stress as laws
-from echotruth.mechanics.solver.active_stress import active_stress
+from echotruth.mechanics.solver.active_stress import active_stress, deformed_area
 
 PASSIVE, ACTIVE, VOLUMETRIC, TOTAL = range(4)
 """Parts: for a stiffness, an active tension and a pressure of one, and the total."""
@@ -98,9 +98,10 @@ def evaluate(j, law, scale, previous_c, taut_c, work, with_tangent):
     S = C S_passive + T_Ca S_active + (p + C pointwise_bulk_ratio (J - 1)) J C^-1
     + viscosity (C - C_previous) / (2 time since) + taut stiffness (C - C_ED) / 2; the last term but one is viscous
     (Kelvin-Voigt), with the growth of C since the previous state, the last one that of a scar. S_active acts along the
-    fibre, and by its shares along sheet and normal, in each direction as the stretch there demands: the stress of
-    fibres that are dispersed into these directions. Only that along the fibre falls with the velocity, because fibres
-    midway to a direction in which the wall lengthens hardly shorten. A tension below zero is left over from a
+    fibre, and by its shares along sheet and normal: the tension of fibres that are dispersed into these directions, as
+    in Walker et al. (Am J Physiol 289 (2005) H692). Across the fibre it is a tension per deformed area that follows
+    neither the stretch nor the velocity there: a share that grew with the stretch along the normal would hold the
+    length of a heart whose wall thickens back, and leave it to a weak heart. A tension below zero is left over from a
     solution and not of muscle: it does not fall with the velocity.
     """
     stiffness, tension, pressure, rate, taut = scale
@@ -116,12 +117,14 @@ def evaluate(j, law, scale, previous_c, taut_c, work, with_tangent):
     for k in range(6):
         viscous = (viscous_modulus * (c[k] - previous_c[k]) + taut * (c[k] - taut_c[k])) / 2
         stress[TOTAL, k] = stiffness * passive[k] + hydrostatic * j * inverse[k] + viscous
+    active, active_tangent = active_stress(c[0], previous_c[0], rate if tension > 0 else 0.0, law.active)
     for k in range(3):
-        share = 1.0 if k == 0 else law.cross_fibre[k - 1]
-        active, active_tangent = active_stress(c[k], previous_c[k], rate if k == 0 and tension > 0 else 0.0, law.active)
-        stress[TOTAL, k] += tension * share * active
-        stress[ACTIVE, k], stress[ACTIVE, k + 3] = share * active, 0.0
-        active_stiffness[k] = share * active_tangent
+        if k > 0:
+            active, active_tangent = deformed_area(c[k], law.active)
+            active, active_tangent = law.cross_fibre[k - 1] * active, law.cross_fibre[k - 1] * active_tangent
+        stress[TOTAL, k] += tension * active
+        stress[ACTIVE, k], stress[ACTIVE, k + 3] = active, 0.0
+        active_stiffness[k] = active_tangent
     if with_tangent:
         laws.isochoric_tangent(c, inverse, factor, trace, passive, tangent)
         tangent *= stiffness
