@@ -49,6 +49,7 @@ SIZE, FRAMES = 64, 3
 DEPTHS = 8
 """Samples of a line that is made up."""
 OPTIONAL = (
+    "right_endo",
     "blood",
     "endocardium",
     "epicardium",

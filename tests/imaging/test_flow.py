@@ -130,8 +130,8 @@ def test_flow_composes_to_the_motion_since_end_diastole_where_tissue_does_not_le
 @pytest.mark.slow
 def test_flow_composes_nearly_so_within_the_slice_and_is_lost_only_along_the_edge_of_the_wall(composed):
     error, elevation = composed
-    assert elevation.max() < 25e-6
-    assert np.nanquantile(error, 0.99) <= 0.05
+    assert elevation.max() < 40e-6
+    assert np.nanquantile(error, 0.99) <= 0.1
     assert np.isfinite(error).mean() > 0.9
 
 

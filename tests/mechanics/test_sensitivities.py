@@ -45,7 +45,7 @@ def test_contractility_of_a_segment():
     ("config", "key", "value", "step"),
     [
         (HEART, "mechanics.regional.stiffness.8", 1.0, 2e-3),
-        (HEART, "mechanics.active.sheet_share", 0.43, 5e-4),
+        (HEART, "mechanics.active.sheet_share", 0.32, 5e-4),
         (HEART, "fibres.endo_deg", 80.0, 0.05),
         (HEART, "geometry.wall_mm", 1.0, 5e-4),
         (HEART, "loop.esp_mmHg", 100.0, 0.1),

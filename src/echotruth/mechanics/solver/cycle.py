@@ -250,7 +250,7 @@ def overstrained(cycle: Cycle, tension: Floats, cross_fibre: Floats) -> str:
     """
     if cycle.volume is None or tension.max() < OVERSTRAINED:
         return ""
-    said = f"The loop asks for a T_Ca of {tension.max() / 1e3:.3g} kPa, and muscle bears {OVERSTRAINED / 1e3:g}"
+    said = f"The loop asks for a T_Ca of {tension.max() / 1e3:.0f} kPa, and muscle bears {OVERSTRAINED / 1e3:g}"
     most = MOST_NORMAL_SHARE * cross_fibre[0]
     if cross_fibre[1] > most:
         return f"{said}: give mechanics.active.normal_share of {most:.2g} or less, or raise sheet_share."
