@@ -91,11 +91,14 @@ def test_derivatives_are_those_of_what_the_model_shows(observed, tmp_path):
     ]
     views, segments = ["mid"] * 7 + ["long_axis"] * 3, [0, *range(7, 13), 3, 14, 16]
     model, mean = HeartModel(config, free, views, segments), prior_of(free).mean
-    along, step = prior_of(free).sd, 0.02  # so small that the solver takes the same steps
-    first = model(mean)
-    above, below = (model(mean + sign * step * along).observed for sign in (1, -1))
+    along, first = prior_of(free).sd, model(mean)
     due = first.jacobian @ along
-    np.testing.assert_allclose((above - below) / (2 * step), due, rtol=0.02, atol=0.01 * np.abs(due).max())
+    found = []
+    for step in (0.01, 0.03, 0.05, 0.15, 0.2):
+        above, below = (model(mean + sign * step * along).observed for sign in (1, -1))
+        found.append((above - below) / (2 * step))
+    # The median: where one of two hearts is solved with a halved step of the load, their difference has a jump.
+    np.testing.assert_allclose(np.median(found, axis=0), due, rtol=0.02, atol=0.01 * np.abs(due).max())
 
 
 @pytest.mark.parametrize(
