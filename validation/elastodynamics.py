@@ -245,14 +245,14 @@ def report(results: Results) -> Report:
             rows.append(Row(name, float(beat.at(TIMES[5])[0, axis]), float(middle[0, axis, 5]), None, "", ".2f"))
     text = (
         "A ventricle of human size contracts under a given pressure (Arostica et al., Comput Methods Appl Mech Eng 435 "
-        "(2025) 117485, benchmark 1, step 2, case B): pressure and active stress follow from differential equations, "
-        "the wall is viscous, and springs and dashpots hold the epicardium along its normal "
+        "(2025) 117485, benchmark 1, step 2, case B). Pressure and active stress follow from differential equations. "
+        "The wall is viscous. Springs and dashpots hold the epicardium along its normal "
         "and the base in every direction. Inertia is left out here, steps of 10 ms are implicit, and the invariants "
         "of fibre and sheet are isochoric. Range of the ten codes: from the data of the paper (Zenodo 14260459, CC BY "
         "4.0) as CoupFE-Cardiac gives it; expected is its middle. Judged is u_x, along the long axis, the largest: it "
         "must lie in the range. The small ones are shown: u_y, in radial direction, leaves the range by up to 0.1 mm, "
-        "u_z, a rotation, by 1 mm. The spring of the epicardium is so stiff (1e8 Pa/m) that the wall slides along it, "
-        "and plane faces, which have one normal each, brake that, the more the larger they are: rotation and "
+        "u_z, a rotation, by 1 mm. The spring of the epicardium is so stiff (1e8 Pa/m) that the wall slides along it. "
+        "Plane faces have one normal each and brake that, the more the larger they are. So rotation and "
         "shortening depend on the faces. Those of the public mesh of the benchmark are 5 mm, and so are those with 42 "
         "around here, which were chosen for that. Refinement through the wall and in time was not tried."
     )
