@@ -88,8 +88,8 @@ def active_stress(c: float, previous_c: float, rate: float, law: ActiveLaw) -> t
     if rate > 0:
         force, slope = force_velocity((stretch - sqrt(previous_c)) * rate, law)
     per_area, falls = deformed_area(c, law)
-    isometric = (1 + law.length_dependence * (stretch - 1)) * per_area
-    growth = law.length_dependence * per_area / stretch + (1 + law.length_dependence * (stretch - 1)) * falls
+    longer = 1 + law.length_dependence * (stretch - 1)
+    isometric, growth = longer * per_area, law.length_dependence * per_area / stretch + longer * falls
     return force * isometric, force * growth + slope * rate * isometric / stretch
 
 
