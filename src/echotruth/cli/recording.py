@@ -7,13 +7,13 @@ from typing import Any
 
 from echotruth.echo.failure import FACTS, EchoError, unsaid
 
-TELLING = (".dcm", ".dicom", ".nii", ".nii.gz")
+TELLING = (".dcm", ".dicom", ".nii", ".nii.gz", ".zarr")
 """Endings of files that may say the side of pixels and the time from frame to frame; so may a file without one."""
 
 
 def add(parser: argparse.ArgumentParser, crop: str, several: bool = False) -> None:
     """Add the clip, or several, and what their files may not say; `crop` is what is shown by default, in words."""
-    text = "DICOM, video, .gif, NIfTI or .npy of one's own echo, or a folder of images"
+    text = "DICOM, video, .gif, NIfTI, .npy or EchoXFlow's .zarr of one's own echo, or a folder of images"
     parser.add_argument("clip", type=Path, nargs="+" if several else None, help=text)
     parser.add_argument("--spacing-mm", type=float, help="side of a pixel, mm (default: what the file says)")
     parser.add_argument(
@@ -28,7 +28,8 @@ def add(parser: argparse.ArgumentParser, crop: str, several: bool = False) -> No
 
 def missing(clip: Path, arguments: argparse.Namespace) -> list[str]:
     """Options without which a clip cannot be read, since a file of its kind never says them."""
-    is_silent = clip.is_dir() or (clip.is_file() and clip.suffix and not clip.name.lower().endswith(TELLING))
+    is_untold = clip.is_dir() or (clip.is_file() and clip.suffix)
+    is_silent = is_untold and not clip.name.lower().endswith(TELLING)
     return [name for name in ("spacing_mm", "frame_time_ms") if is_silent and getattr(arguments, name) is None]
 
 

@@ -38,10 +38,10 @@ def read_clip(
     Parameters
     ----------
     source : str, Path or array_like
-        DICOM, video (.mp4, .avi, .mov, .mkv), .gif, .tif of several pages, NIfTI, .npy, a folder of images, or grey
-        levels (frame, axial, lateral). Images of a folder are frames in the order of the numbers in their names.
-        Levels of 8 bits are taken as they are; those of more bits, or real, are scaled so that the least of the clip
-        becomes 0 and the largest 255. Images in colour of more bits keep the upper 8.
+        DICOM, video (.mp4, .avi, .mov, .mkv), .gif, .tif of several pages, NIfTI, .npy, a folder of images, the .zarr
+        of a recording of EchoXFlow, or grey levels (frame, axial, lateral). Images of a folder are frames in the order
+        of the numbers in their names. Levels of 8 bits are taken as they are; those of more bits, or real, are scaled
+        so that the least of the clip becomes 0 and the largest 255. Images in colour of more bits keep the upper 8.
     spacing_mm : float, optional
         Distance of pixel centres. Default: what the file says; videos and images say nothing.
     frame_time_ms : float, optional

@@ -1,4 +1,4 @@
-"""Recorded clips in files of other kinds than DICOM: video, animation, images, NIfTI, NumPy."""
+"""Recorded clips in files of other kinds than DICOM: video, animation, images, NIfTI, NumPy, EchoXFlow."""
 
 import os
 import re
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from echotruth.echo import dicom
+from echotruth.echo import dicom, echoxflow
 from echotruth.echo.failure import FEWEST_FRAMES, EchoError, one_line, optional
 from echotruth.echo.recording import Recording, check_size, grey
 
@@ -39,11 +39,11 @@ def read(path: Path) -> Recording:
     EchoError
         If there is no such file, or it holds no clip.
     """
+    suffix = ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
     if os.path.isdir(path):  # which is False of a name that is too long, where a Path raises
-        return _folder(path)
+        return echoxflow.read(path) if suffix == ".zarr" else _folder(path)
     if not os.path.isfile(path):
         raise EchoError(f"{path}: is not there, or no file: give the path of a clip")
-    suffix = ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
     if suffix not in READERS:
         raise EchoError(f"{path}: use a file of {', '.join(name for name in READERS if name)}, or a folder of images")
     return READERS[suffix](path)
@@ -194,5 +194,6 @@ READERS: dict[str, Callable[[Path], Recording]] = {
     **dict.fromkeys((".gif", ".tif", ".tiff"), _animation),
     **dict.fromkeys((".nii", ".nii.gz"), _nifti),
     ".npy": _array,
+    ".zarr": echoxflow.read,
 }
 """Ending of a name -> function that reads such a file."""

@@ -68,5 +68,5 @@ def said(file: Path, what: str) -> str | None:
 def default_output(clip: Path) -> Path:
     """The .csv beside a clip: `patient.wall.csv` of patient.dcm, `FOLDER.wall.csv` of a folder of images."""
     whole = Path(os.path.abspath(clip))  # "." has a name too, and a link stays where it is
-    ending = r"$" if whole.is_dir() else r"(\.nii\.gz|\.[^.]*)?$"
+    ending = r"(\.zarr)?$" if whole.is_dir() else r"(\.nii\.gz|\.[^.]*)?$"
     return whole.with_name(re.sub(ending, ".wall.csv", whole.name, count=1, flags=re.IGNORECASE))
