@@ -6,10 +6,14 @@ import sys
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.ndimage import map_coordinates
 
+from echotruth.echo import echoxflow
 from echotruth.extras import installation
+from echotruth.imaging.beamforming.scan import Sector
+from echotruth.imaging.bmode import clip_gain, largest_clip, pixel_centres
 from echotruth.repository.reader import Repository
-from echotruth.sharing.export import Export
+from echotruth.sharing.export import Export, ExportError
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +33,7 @@ def rf(folder):
 
 def export(folder, name, case, view, output=None):
     work = Export(Repository(folder), name, cases=[case], views=[view], output=output)
-    (file,) = work.write(work.clips()[0])
+    (file,) = work.write(work.clips()[0])  # with the table of a format, which is written last
     return file
 
 
@@ -113,11 +117,18 @@ def test_lines_of_the_uff_are_those_of_the_repository_at_their_places(folder, rf
     np.testing.assert_allclose(data.scan.azimuth_axis, rf.line_angle)
 
 
-def test_zea_is_read_by_its_own_library(folder, rf, monkeypatch):
-    monkeypatch.setenv("KERAS_BACKEND", "jax")
+def times(folder):
+    """Times of the frames, s."""
+    return Repository(folder).read("mechanics/time", "heart")
+
+
+def test_zea_is_read_by_its_own_library(folder, rf):
     zea = pytest.importorskip("zea")
     with zea.File(written(folder, "zea")) as file:
-        file.validate()
+        spec = file.validate_spec()  # all fields, their types and shapes
+        lines = file.data.beamformed_data.values[:]
+        np.testing.assert_array_equal(lines[..., 0] + 1j * lines[..., 1], rf.lines.transpose("frame", "range", "line"))
+        np.testing.assert_allclose(spec.data.beamformed_data.timestamps, times(folder), rtol=1e-6)
         np.testing.assert_allclose(file.data.raw_data[0, :, :, :, 0], echoes(rf)[0].transpose(0, 2, 1), rtol=1e-5)
         parameters = file.load_parameters()
     assert (parameters.n_tx, parameters.n_el) == (ELEMENTS, ELEMENTS)
@@ -199,6 +210,54 @@ def test_uff_is_laid_out_as_the_toolbox_writes_it(folder, rf):
         assert data["probe/geometry"].shape == (7, ELEMENTS)
         assert sorted(file["beamformed_data/data"]) == ["imag", "real"]
         assert file.attrs["version"].tolist() == ["v1.2.0"]  # `read_object` takes the first of a list
+
+
+def test_echoxflow_is_the_bmode_before_scan_conversion(folder, rf):
+    """Scan-converted as a recording, it is the B-mode of the same lines, but for where the logarithm is taken."""
+    config = Repository(folder).case("heart").config
+    clip = echoxflow.read(export(folder, "echoxflow", "heart", "mid"))
+    range_, half = rf.range.values, float(rf.line_angle[-1])
+    gain = clip_gain(config.probe, config.bmode, rf.sizes["line"], range_, np.random.default_rng(0))
+    size = config.bmode.model_copy(update={"size_px": 512})
+    bmode = largest_clip(rf.lines.values, Sector(rf.line_angle.values), range_, size, gain)
+    axial, lateral = pixel_centres(size, 512)
+    step = clip.spacing[0]
+    rows, columns = (axial - range_[0] * np.cos(half)) / step, (lateral + range_[-1] * np.sin(half)) / step
+    at = np.meshgrid(rows, columns, indexing="ij")
+    inside = np.hypot(axial[:, None], lateral) < 0.99 * range_[-1]
+    inside &= abs(np.arctan2(lateral, axial[:, None])) < 0.95 * half
+    for ours, image in zip(bmode, clip.frames.astype(float), strict=True):
+        found = map_coordinates(image, at, order=1)[inside]
+        assert np.corrcoef(found, ours[inside])[0, 1] > 0.99
+        assert abs(np.mean(found - ours[inside])) < 1  # the same level is white
+    np.testing.assert_allclose(clip.time, times(folder), rtol=1e-6)
+
+
+def test_echoxflow_is_read_by_the_published_loader(folder, rf, tmp_path):
+    loader = pytest.importorskip("echoxflow", reason="is in no package index")
+    export(folder, "echoxflow", "heart", "mid", tmp_path)
+    (record,) = loader.find_recordings(croissant=loader.load_croissant(tmp_path / "croissant.json"))
+    stream = loader.open_recording(record, root=tmp_path).load_stream("2d_brightness_mode")
+    assert stream.data.shape == (FRAMES, rf.sizes["range"], rf.sizes["line"]) and stream.data.max() == 255
+    sector = stream.metadata.geometry
+    found = sector.depth_start_m, sector.depth_end_m, sector.angle_start_rad, sector.angle_end_rad
+    assert found == pytest.approx([*rf.range.values[[0, -1]], *rf.line_angle.values[[0, -1]]])
+    np.testing.assert_allclose(stream.timestamps, times(folder), rtol=1e-6)
+    assert stream.sample_rate_hz == pytest.approx(1 / np.diff(times(folder))[0])
+
+
+def test_echoxflow_is_written_again_in_its_place_and_over_nothing_else(folder, tmp_path):
+    path = export(folder, "echoxflow", "heart", "mid", tmp_path / "a.zarr")
+    first = (path / "zarr.json").read_bytes()
+    assert (export(folder, "echoxflow", "heart", "mid", path) / "zarr.json").read_bytes() == first
+    (path / "other").mkdir()
+    with pytest.raises(ExportError, match="holds something else"):
+        export(folder, "echoxflow", "heart", "mid", path)
+
+
+def test_parallel_lines_are_no_recording_of_echoxflow(rf_repository, tmp_path):
+    with pytest.raises(ExportError, match="has parallel lines, and echoxflow holds sectors"):
+        export(rf_repository([], scan="linear"), "echoxflow", "heart", "mid", tmp_path)
 
 
 BEAMFORMED = {"scan", "data", "probe", "pulse", "sequence", "phantom"}

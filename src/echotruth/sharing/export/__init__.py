@@ -32,7 +32,7 @@ class Format:
     module : str
         Module of this package with its function `write`.
     suffix : str
-        Suffix of its files; "" if it writes a folder.
+        Suffix of its files, of which a .zarr is a folder; "" for folders without suffix.
     stages : tuple of str
         Stages of which it needs the arrays, besides the heart.
     holds : {"clip", "view", "heart"}
@@ -75,6 +75,7 @@ FORMATS = {
     "tap": Format("tap", ".npz"),
     "uff": Format("uff", ".uff", ("rf",), "view"),
     "zea": Format("zea", ".hdf5", ("rf",), "view"),
+    "echoxflow": Format("echoxflow", ".zarr", ("rf",), "view", table="croissant.json"),
 }
 """What can be written, by the name of the format."""
 
@@ -193,7 +194,8 @@ class Export:
     def _is_file(self) -> bool:
         """Whether `output` is the path of a single file."""
         suffix = FORMATS[self.format].suffix
-        return bool(suffix) and self._output.name.endswith(suffix) and not self._output.is_dir()
+        is_folder = self._output.is_dir() and suffix != ".zarr"
+        return bool(suffix) and self._output.name.endswith(suffix) and not is_folder
 
     def _targets(self, clips: Sequence[ExportedClip]) -> list[Path]:
         if self._is_file:

@@ -27,8 +27,7 @@ def draft(target: Path) -> Iterator[Path]:
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         yield path
-        files = sorted(path.iterdir()) if path.is_dir() else [path]
-        _require_replaceable(target, {file.suffix for file in files})
+        _require_replaceable(target, path)
         if target.is_dir():
             target.replace(old)
         path.replace(target)
@@ -39,10 +38,16 @@ def draft(target: Path) -> Iterator[Path]:
             rmtree(rest, ignore_errors=True) if rest.is_dir() else rest.unlink(missing_ok=True)
 
 
-def _require_replaceable(target: Path, suffixes: set[str]) -> None:
-    """Raise an error for a folder that no export made."""
+def _require_replaceable(target: Path, path: Path) -> None:
+    """Raise an error for a folder that no export made: one with other kinds of files than the draft, or folders."""
     if not target.is_dir():
         return
-    odd = sorted(file.name for file in target.iterdir() if file.is_dir() or file.suffix not in suffixes)
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    suffixes, folders = {file.suffix for file in files}, {file.name for file in files if file.is_dir()}
+    odd = sorted(
+        file.name
+        for file in target.iterdir()
+        if (file.name not in folders if file.is_dir() else file.suffix not in suffixes)
+    )
     if odd:
         raise ExportError(f"{target} holds something else ({odd[0]}): give another folder with --output")

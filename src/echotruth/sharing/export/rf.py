@@ -1,4 +1,4 @@
-"""RF as uff and zea need it: channels without quantisation step, and positions of the samples of the lines."""
+"""RF as uff, zea and echoxflow need it: channels without quantisation step, and places of the samples of the lines."""
 
 from collections.abc import Iterator
 

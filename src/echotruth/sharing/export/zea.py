@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from echotruth.arrays import Floats
 from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.error import optional
 from echotruth.sharing.export.rf import open_rf, sample_positions, scaled_channels
@@ -32,7 +33,7 @@ def write(clip: ExportedClip, path: Path) -> None:
         if "channels" in rf:
             _raw(data, rf)
             _scan(track.create_group("scan"), rf)
-        _beamformed(data.create_group("beamformed_data"), rf)
+        _beamformed(data.create_group("beamformed_data"), rf, clip.time)
 
 
 def _probe(group: Any, rf: xr.Dataset) -> None:
@@ -77,12 +78,13 @@ def _scan(group: Any, rf: xr.Dataset) -> None:
     )
 
 
-def _beamformed(group: Any, rf: xr.Dataset) -> None:
+def _beamformed(group: Any, rf: xr.Dataset, time: Floats) -> None:
     lateral, axial = (coordinate.T for coordinate in sample_positions(rf))
     values = group.create_dataset("values", (rf.sizes["frame"], *axial.shape, 2), np.float32)
     for frame, lines in enumerate(rf.lines):
         values[frame] = np.stack([lines.values.real.T, lines.values.imag.T], axis=-1)
     _put(group, coordinates=np.stack([lateral, np.zeros(axial.shape), axial], axis=-1))
+    _put(group, timestamps=time - time[0], start_time_offset=0.0)
     group["labels"] = ["I", "Q"]
 
 
