@@ -55,6 +55,7 @@ def test_the_matrix_is_that_of_esdiva(agreement, array):
 @pytest.mark.parametrize("array", ARRAYS)
 def test_the_exact_sum_is_that_of_zea_but_for_the_baffle(exact, array):
     pytest.importorskip("zea")
+    pytest.importorskip("jax")
     assert exact.transmit(exact.Zea, exact.ARRAYS[array], law=exact.rigid_baffle) < 2e-4
     assert exact.transmit(exact.Zea, exact.ARRAYS[array]) > 1e-2
 
