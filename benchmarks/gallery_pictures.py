@@ -97,7 +97,9 @@ def _elevation(figure: Figure, axes: Axes, clip: xr.Dataset, flow: xr.DataArray)
     limit = float(np.ceil(np.nanpercentile(np.abs(1e6 * flow), 99) / 10) * 10)
     shown = axes.imshow(1e6 * flow, cmap=style.SIGNED, vmin=-limit, vmax=limit, alpha=0.75, interpolation="nearest")
     label = f"Elevation (µm); the slice is {1e6 * float(clip['thickness'].median()):.0f} µm thick"
-    figure.colorbar(shown, ax=axes, orientation="horizontal", shrink=0.8, pad=0.02).set_label(label)
+    bar = figure.colorbar(shown, ax=axes, orientation="horizontal", shrink=0.8, pad=0.02)
+    bar.solids.set_alpha(1)  # else its edges show
+    bar.set_label(label)
 
 
 def _paths(axes: Axes, clip: xr.Dataset, tracks: xr.Dataset) -> None:

@@ -20,6 +20,7 @@ from echotruth.heart import SHORT_AXIS, Heart
 from echotruth.loop.phases import CONTRACTION, EJECTION, FILLING
 from echotruth.mechanics import fibres, kinematics
 from echotruth.report import style
+from echotruth.report.clip import round_length
 
 Floats = NDArray[np.float64]
 
@@ -151,12 +152,22 @@ def draw(hearts: dict[str, Heart]) -> Figure:
         for axes, frame in zip(panels[2 * number + 1], instants(heart).values(), strict=True):
             time = 1e3 * heart.arrays["mechanics"]["time"][frame]
             axes.set_xlabel(f"{time:.0f} ms", color=style.MUTED, fontsize=8)
+    _scale_bar(panels[0][0])
     for axes, instant in zip(panels[0], instants(heart), strict=True):
         axes.set_title(instant, fontsize=9)
     bar: dict[str, Any] = {"orientation": "horizontal", "shrink": 0.7, "aspect": 40, "pad": 0.01, "extend": "both"}
     figure.colorbar(SCALE, ax=np.ravel(panels), **bar).set_label(style.QUANTITIES["CC"].label)
     figure.legend(handles=[Line2D([], [], **AT_ED, label="wall at end-diastole")], loc="outside lower center")
     return figure
+
+
+def _scale_bar(axes: Axes) -> None:
+    """Draw a bar of a round length at the open end of a long axis, between the walls."""
+    (left, right), low = axes.get_xlim(), axes.get_ylim()[0]
+    length = 1e3 * round_length(1e-3 * (right - left))
+    middle, height = (left + right) / 2, low + 0.04 * (right - left)
+    axes.plot([middle - length / 2, middle + length / 2], [height] * 2, color=style.INK, solid_capstyle="butt")
+    axes.text(middle, height + 0.03 * (right - left), f"{length:g} mm", ha="center", va="bottom", fontsize=8)
 
 
 def _cuts(heart: Heart) -> list[list[Section]]:

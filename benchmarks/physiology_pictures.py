@@ -53,9 +53,9 @@ class State(NamedTuple):
 STATES = (
     State("Healthy", {}, style.INK),
     State("Fresh infarct", {"infarct": {"age": "fresh", "segments": [7, 8, 12, 13, 14]}}, style.SERIES[1]),
-    State("Left bundle branch block", {"activation": {"preset": "lbbb"}}, style.SERIES[3]),
+    State("Left bundle branch block", {"activation": {"preset": "lbbb"}}, style.SERIES[2]),
     State("Dilated cardiomyopathy", {"preset": "dcm"}, style.SERIES[0]),
-    State("Hypertension", {"preset": "hypertension"}, style.SERIES[2]),
+    State("Hypertension", {"preset": "hypertension"}, style.SERIES[4]),
 )
 SECTIONS = 3
 """Number of states whose sections are drawn, the first ones."""

@@ -1,7 +1,8 @@
 """The report: figures of the repository, and the page that shows them."""
 
-FIGURES = ["loop", "strain", "physiology", "population", "curves", "segments", "bullseye", "error", "leaderboard"]
-FIGURES += ["heart", "views", *(["inference"] if PLAN.config.inference.tracker else [])]
+FIGURES = ["loop", "strain", "physiology", "curves", "segments", "bullseye", "error", "leaderboard", "heart", "views"]
+FIGURES += ["population"] if len(PLAN.cases) > 1 else []
+FIGURES += ["inference"] if PLAN.config.inference.tracker else []
 
 
 rule report:

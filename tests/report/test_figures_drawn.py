@@ -3,7 +3,6 @@ import re
 import numpy as np
 import pandas as pd
 import pytest
-import xarray as xr
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -87,13 +86,9 @@ def test_physiology_of_a_prescribed_motion_has_words_in_place_of_pressure_and_vo
 @pytest.mark.slow
 def test_views(tmp_path):
     image = np.random.default_rng(0).integers(0, 256, (64, 64)).astype(np.uint8)
-    layer = np.zeros((64, 64), int)
-    layer[20:40, 20:40] = 1
+    box = np.array([[[-2.0, 4], [2, 4]], [[2, 4], [2, 7]], [[2, 7], [-2, 7]], [[-2, 7], [-2, 4]]])
     there = views.Where(np.array([[[-1.0, 0], [1, 0]], [[1, 0], [0, 2]]]), np.array([0.0, 1]), np.array([0.0, 0.5]))
-    shown, outside = (
-        xr.Dataset({"image": (("axial", "lateral"), image), "layer": (("axial", "lateral"), labels)})
-        for labels in (layer, 0 * layer)
-    )
+    shown, outside = (views.Picture(image, border) for border in (box, box[:0]))
     one = {"mid": [shown] * 2, "long_axis": [outside] * 2}
     places = dict.fromkeys(one, there)
     with_wall = coloured(seen(style.save(views.draw(one, places, 12e-3), tmp_path / "one.png")), style.BORDER)
@@ -117,7 +112,7 @@ def test_place_of_a_view_is_a_line_across_a_section_with_the_apex_or_the_anterio
     nodes = mesh.nodes * 6e-3 / np.ptp(mesh.nodes[:, 2])
     nodes = nodes - [0, 0, nodes[:, 2].max()] - [0, 0, nodes[:, 2].mean() - nodes[:, 2].max() + 3e-3]
     solved = Heart(nodes, mesh.cells, np.zeros((1, *nodes.shape)), mesh.nodes[:, 0], mesh.endo, 1, 0)
-    found = views.where(solved, plane, origin, normal)
+    found = views.where(solved, plane, np.array(origin), np.array(normal))
     np.testing.assert_allclose(found.normal, normal_on_page, atol=1e-12)
     np.testing.assert_allclose(found.point, point, atol=1e-6)
     if plane == "short_axis":
@@ -126,11 +121,20 @@ def test_place_of_a_view_is_a_line_across_a_section_with_the_apex_or_the_anterio
         assert top[0] == pytest.approx(0, abs=0.3) and widths[0] < widths[1], "the narrow end, the apex, is up"
 
 
+def test_border_in_a_view_is_the_section_of_the_wall_in_that_frame(half_sphere, hemispherical_heart):
+    """Half a sphere with radii of 2 and 3 mm, cut 1 mm from its centre, at rest and shrunk to nine tenths."""
+    heart = hemispherical_heart(np.stack([0 * half_sphere.nodes, -0.1 * half_sphere.nodes]))
+    for frame, scale in enumerate((1.0, 0.9)):
+        ends = views.border(heart, frame, np.array([1e-3, 0, -1e-3]), np.eye(3)[:2]).reshape(-1, 2) + [1, 0]
+        expected = np.sqrt((scale * np.array([2, 3])) ** 2 - 1)
+        radii = np.hypot(*ends.T)
+        assert np.abs(radii[:, None] - expected).min(1).max() < 0.01
+        np.testing.assert_allclose([radii.min(), radii.max()], expected, atol=0.01)
+
+
 def test_views_show_the_part_that_holds_the_wall(tmp_path):
-    layer = np.zeros((64, 64), int)
-    layer[40:50, 40:50] = 1
-    left, right, bottom, top = views._shown([layer], 12.0)
-    assert left < 40 / 64 * 12 - 6 < 50 / 64 * 12 - 6 < right and top < 40 / 64 * 12 < 50 / 64 * 12 < bottom
+    left, right, bottom, top = views._shown([np.array([[[1.5, 7.5], [3.4, 9.4]]])], 12.0)
+    assert left < 1.5 and right > 3.4 and top < 7.5 and bottom > 9.4
     assert right - left < 6 and bottom - top < 6
 
 
@@ -209,11 +213,24 @@ def test_panel_whose_trackers_have_no_values_says_so_and_others_do_not():
 
     def words(tracked):
         axes = Figure().subplots()
-        curves._panel(axes, panel(tracked))
+        curves._panel(axes, panel(tracked), dict.fromkeys(tracked, style.INK))
         return [text.get_text() for text in axes.texts]
 
     assert words({"one": nothing, "two": nothing}) == [curves.NO_VALUES]
     assert words({"one": nothing, "two": WAVE}) == words({}) == []
+
+
+def test_a_tracker_has_the_same_colour_whatever_its_rank():
+    """The colour of its place in the configuration."""
+
+    def colours(*ranked):
+        panels = [[panel({name: WAVE for name in ranked})]]
+        (legend,) = curves.draw(panels, ["first", "second"]).legends
+        words = [text.get_text() for text in legend.get_texts()]
+        return dict(zip(words, (line.get_color() for line in legend.get_lines()), strict=True))
+
+    assert colours("first", "second") == colours("second", "first")
+    assert colours("second")["second"] == style.series_colour(1)
 
 
 def test_axis_of_curves_shows_truth_and_best_tracker_and_is_not_ruled_by_the_worst():

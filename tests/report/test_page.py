@@ -153,7 +153,7 @@ def test_many_hearts_are_listed_with_their_number_and_one_view_is_enough(reporte
     views = {"long": SETTINGS["views"]["long"]}
     made = make(tmp_path / "known", SETTINGS | {"views": views, "cases": {"seed": [1, 2]}})
     figures = Figures(Repository(made.folder), shutil.copytree(reported.folder / "figures", made.folder / "figures"))
-    drawn = {name: getattr(figures, name)() for name in (*OF_HEARTS, *OF_TRACKERS)}
+    drawn = {name: getattr(figures, name)() for name in (*OF_HEARTS, "population", *OF_TRACKERS)}
     for name in ("population", "views"):
         style.save(drawn[name], figures.folder / name)
     elements = Elements(page.write(figures.repository).read_text(encoding="utf-8"))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from echotruth.report import style
+
 pytestmark = pytest.mark.slow
 
 
@@ -84,11 +86,33 @@ def test_nothing_is_wider_than_the_window(player):
         assert player.evaluate("document.documentElement.scrollWidth") <= width
 
 
+def test_what_goes_on_beyond_the_window_has_a_shade_there_until_it_is_scrolled_to(player):
+    player.set_viewport_size({"width": 390, "height": 900})
+    table = player.locator("#trackers .scroll")
+
+    def edge():
+        """Darkest shade of grey above the headings at the right side."""
+        picture = Image.open(BytesIO(table.screenshot())).convert("L")
+        return int(np.asarray(picture)[:3, -12:].min())
+
+    assert table.evaluate("table => table.scrollWidth > table.clientWidth")
+    assert edge() < 230
+    table.evaluate("table => { table.scrollLeft = table.scrollWidth; }")
+    assert edge() > 250
+
+
+def test_tracked_paths_have_the_colour_of_the_curve_of_their_tracker(player, reported):
+    path = player.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--tracked')")
+    figure = (reported.folder / "figures/curves.svg").read_text(encoding="utf-8")
+    assert path.strip() in style.SERIES and path.strip() in figure
+    assert 'stroke="var(--tracked)"' in player.locator("#course").inner_html()
+
+
 def test_text_and_axes_stand_out_from_the_paper_in_light_and_dark(player):
     script = """() => { const computed = getComputedStyle(document.documentElement);
         const value = (name) => computed.getPropertyValue(name).trim();
         return ['--paper', '--ink', '--muted', '--target', '--radial', '--circumferential', '--longitudinal',
-                '--size-0', '--size-1'].map(value); }"""
+                '--size-0', '--size-1', '--series-0', '--series-1', '--series-2', '--series-3'].map(value); }"""
     for scheme in ("light", "dark"):
         player.emulate_media(color_scheme=scheme)
         paper, *others = (luminance(colour) for colour in player.evaluate(script))

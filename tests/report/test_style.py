@@ -40,7 +40,7 @@ def test_colours_of_quantities_are_their_own():
     assert shared <= {style.INK}
     assert not set(of.values()) & set(style.SERIES)
     assert style.QUANTITIES["GCS"].colour == of["CC"] and style.QUANTITIES["GLS"].colour == of["LL"]
-    over_images = (style.MOTION, style.TRACKED, style.FLOW, style.BORDER)
+    over_images = (style.MOTION, style.FLOW, style.BORDER, *style.SERIES)
     assert len(set(over_images)) == len(over_images)
 
 
@@ -52,7 +52,7 @@ def test_shortening_is_blue_and_zero_is_white():
 def test_no_other_module_of_the_package_names_a_colour_of_a_quantity():
     """Not as a number, so that it cannot differ; style sheets of dark paper have shades of their own."""
     named = {quantity.colour for quantity in style.QUANTITIES.values()} - {style.INK}
-    named |= {style.MOTION, style.TRACKED, style.FLOW, style.BORDER, *style.SERIES}
+    named |= {style.MOTION, style.FLOW, style.BORDER, *style.SERIES}
     named |= {to_hex(colour) for colour in style.layer_colours(3)}
     sources = [path for path in Path(echotruth.__file__).parent.rglob("*") if path.suffix in (".py", ".js", ".jinja")]
     found = {

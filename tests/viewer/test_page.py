@@ -13,6 +13,7 @@ from bokeh.document import Document
 from finished_repository import begin, configured
 from known_repository import SIZES
 
+from echotruth.report import style
 from echotruth.repository.reader import Repository
 from echotruth.viewer.choice import TRUTH, Choice, asked, first
 from echotruth.viewer.page import Page
@@ -95,6 +96,16 @@ def test_truth_beside_a_tracker_has_its_strain_and_no_error(page):
     ]
     choose(page, colour="strain_error")
     assert page.panels[0].bar.visible and not page.panels[1].bar.visible
+
+
+def test_paths_and_curve_of_a_tracker_have_one_colour(page):
+    """That of its place in the configuration, whichever is chosen first."""
+    trackers = page.repository.trackers
+    for tracker, other in (trackers[:2], trackers[1::-1]):
+        choose(page, tracker=tracker, other=other)
+        paths = [panel._renderers["tracked"][0].glyph.line_color for panel in page.panels]
+        curves = [line.glyph.line_color for line in page.graphs["strain"]._lines[1:3]]
+        assert paths == curves == [style.series_colour(trackers.index(name)) for name in (tracker, other)]
 
 
 def test_part_of_the_wall_follows_the_curve(page):

@@ -21,9 +21,6 @@ MAX_GIF_BYTES = 3_000_000
 WIDTH = 2.3
 """Of the frames, over their height."""
 
-OPACITY = 0.55
-"""Of the colours of strain."""
-
 WALL_GREY = 105
 """Grey level, of 255, to which a darker wall is brightened."""
 
@@ -134,7 +131,7 @@ def render(clip: ClipWithMotion, strain: np.ndarray, quantity: style.Quantity, h
         for picture in pictures:
             picture.set_data(grey[t])
         colours = scale.to_rgba(quantity.factor * strain[t])
-        colours[..., 3] = OPACITY * np.isfinite(strain[t])
+        colours[..., 3] = style.OPACITY * np.isfinite(strain[t])
         tint.set_data(colours)
         trails.set_segments(list(np.stack([clip.path[:t], clip.path[1 : t + 1]], axis=2).reshape(-1, 2, 2)))
         trails.set_color(_fading(t, len(clip.position)))

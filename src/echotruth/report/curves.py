@@ -40,29 +40,37 @@ class Panel:
 
 
 @style.styled
-def draw(rows: Sequence[Sequence[Panel | None]]) -> Figure:
-    """Draw panels in rows, all of one length; None leaves a place empty."""
+def draw(rows: Sequence[Sequence[Panel | None]], trackers: Sequence[str]) -> Figure:
+    """Draw panels in rows, all of one length; None leaves a place empty.
+
+    Parameters
+    ----------
+    rows : sequence of sequences of Panel
+    trackers : sequence of str
+        In the order of their colours.
+    """
     columns = max(map(len, rows))
+    colours = {name: style.series_colour(number) for number, name in enumerate(trackers)}
     figure = style.figure(max(2.45 * columns + 0.3, 5.2), 2.15 * len(rows) + 0.5)
     grid = figure.subplots(len(rows), columns, squeeze=False, sharex=False)
     for axes, panel in zip(grid.flat, (panel for row in rows for panel in row), strict=True):
         if panel is None:
             axes.axis("off")
         else:
-            _panel(axes, panel)
+            _panel(axes, panel, colours)
     for axes in grid[-1]:
         axes.set_xlabel("Time since ED (ms)")
-    trackers = list(dict.fromkeys(name for row in rows for panel in row if panel for name in panel.tracked))
-    _legend(figure, trackers)
+    tracked = dict.fromkeys(name for row in rows for panel in row if panel for name in panel.tracked)
+    _legend(figure, {name: colours[name] for name in tracked})
     return figure
 
 
-def _panel(axes: Axes, panel: Panel) -> None:
+def _panel(axes: Axes, panel: Panel, colours: Mapping[str, str]) -> None:
     axes.axhline(0, color=style.MUTED, linewidth=0.6)
     axes.axvline(panel.end_systole, color=style.MUTED, linewidth=0.9, linestyle=":")
     axes.plot(panel.time, panel.true, color=style.TRUTH, linewidth=2.6, zorder=2)
-    for number, (_, values) in reversed(list(enumerate(panel.tracked.items()))):
-        axes.plot(panel.time, values, color=style.series_colour(number), linewidth=1.3, zorder=3)
+    for name, values in reversed(list(panel.tracked.items())):
+        axes.plot(panel.time, values, color=colours[name], linewidth=1.3, zorder=3)
     if panel.tracked and not np.isfinite(list(panel.tracked.values())).any():
         text = axes.text(0.5, 0.4, NO_VALUES, transform=axes.transAxes, color=style.MUTED, fontsize=7, zorder=4)
         text.set(ha="center", va="center", bbox={"facecolor": style.PAPER, "edgecolor": "none", "pad": 2})
@@ -86,9 +94,8 @@ def _limits(panel: Panel) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _legend(figure: Figure, trackers: Sequence[str]) -> None:
+def _legend(figure: Figure, colours: Mapping[str, str]) -> None:
     lines = [Line2D([], [], color=style.TRUTH, linewidth=2.6, label="true")]
-    for number, name in enumerate(trackers):
-        lines.append(Line2D([], [], color=style.series_colour(number), linewidth=1.3, label=name))
+    lines += [Line2D([], [], color=colour, linewidth=1.3, label=name) for name, colour in colours.items()]
     lines += [Line2D([], [], color=style.MUTED, linewidth=0.9, linestyle=":", label="ES")]
     style.legend_below(figure, lines)

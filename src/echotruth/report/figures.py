@@ -37,12 +37,13 @@ from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import measures
 from echotruth.repository import estimates, inferred
 from echotruth.repository.choice import main_view
+from echotruth.repository.datasets import imaged_heart
 from echotruth.repository.reader import Repository
 from echotruth.repository.schema import LABELS, observations
 from echotruth.units import mm
 
-OF_HEARTS = ("clip", "loop", "strain", "physiology", "population", "heart", "views")
-"""Figures of hearts and of their images."""
+OF_HEARTS = ("clip", "loop", "strain", "physiology", "heart", "views")
+"""Figures of hearts and of their images; with several hearts there is `population` as well."""
 
 OF_TRACKERS = ("curves", "segments", "bullseye", "error", "leaderboard")
 """Figures of what trackers found."""
@@ -83,13 +84,14 @@ class Figures:
             With several, those of trackers are drawn by a process of their own.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
+        of_hearts = (*OF_HEARTS, "population") if len(self.repository.every) > 1 else OF_HEARTS
         if threads > 1:
             with ProcessPoolExecutor(1) as other:
                 drawn = other.submit(self._save, OF_TRACKERS)
-                self._save(OF_HEARTS)
+                self._save(of_hearts)
                 drawn.result()
         else:
-            self._save((*OF_HEARTS, *OF_TRACKERS))
+            self._save((*of_hearts, *OF_TRACKERS))
         if self.config.inference.tracker:
             inferred.write(self.repository.folder / inferred.FILE, self.inferred)
             self._save(("inference",))
@@ -178,10 +180,13 @@ class Figures:
         """Every view: where it is in the heart, and its images at end-diastole and end-systole."""
         pictures, places = {}, {}
         for view, settings in self.config.views.items():
-            found = self.repository.clip(self.case, view, self.sizes[0], ("image", "layer"))
-            pictures[view] = [found.isel(frame=frame) for frame in (0, self.shown.es)]
-            plane = found.attrs["plane_origin"], found.attrs["plane_axes"][6:]
-            places[view] = views.where(self.shown, settings.plane, *plane)
+            found = self.repository.clip(self.case, view, self.sizes[0], ("image",))
+            imaged, plane = imaged_heart(found, self.shown)
+            pictures[view] = [
+                views.Picture(found["image"].values[frame], views.border(imaged, frame, plane.origin, plane.axes[:2]))
+                for frame in (0, self.shown.es)
+            ]
+            places[view] = views.where(self.shown, settings.plane, plane.origin, plane.axes[2])
         return views.draw(pictures, places, self.config.bmode.field_of_view_mm * mm)
 
     @cached_property
@@ -202,11 +207,12 @@ class Figures:
 
     def curves(self) -> Figure:
         """Tracked against true curves of strain, rotation and twist."""
-        return curves.draw(self.comparison.rows)
+        return curves.draw(self.comparison.rows, self.repository.trackers)
 
     def segments(self) -> Figure:
         """Tracked against true strain of the segments of a view, by the best tracker."""
-        return curves.draw(self.comparison.segments(self.view, self.comparison.trackers[0]))
+        panels = self.comparison.segments(self.view, self.comparison.trackers[0])
+        return curves.draw(panels, self.repository.trackers)
 
     def leaderboard(self) -> Figure:
         """The leaderboard as a table and as a figure."""

@@ -55,12 +55,14 @@ def _context(repository: Repository) -> dict[str, Any]:
     standings = pd.read_csv(folder / "figures/leaderboard.csv") if case else None
     order = [name for name in best(standings) if name in repository.trackers] if standings is not None else []
     comparison = Comparison(repository, repository.case(case), tuple(order)) if case else None
+    tracker = comparison.trackers[0] if comparison else ""
+    number = repository.trackers.index(tracker) if tracker else 0
     hearts = subjects(repository, view, config.bmode.sizes[-1]) if shown else []
     return {
         "config": config,
         "version": report_version(folder),
         "packages": repository.attributes("").get("packages", {}),
-        "css": Markup(_colours() + (HERE / "page.css").read_text(encoding="utf-8")),
+        "css": Markup(_colours(number) + (HERE / "page.css").read_text(encoding="utf-8")),
         "script": Markup((HERE / "player.js").read_text(encoding="utf-8")),
         "figure": lambda name, title: Markup(vector.inline(folder / f"figures/{name}.svg", title)),
         "title": style.title,
@@ -70,9 +72,10 @@ def _context(repository: Repository) -> dict[str, Any]:
         "bytes": account.size_on_disk(folder / f"{config.name}.zarr"),
         "board": board.of(standings, config.bmode.sizes[0], len(shown)) if standings is not None else None,
         "shown": shown,
-        "best": comparison.trackers[0] if comparison else "",
+        "best": tracker,
         "main_view": view,
         "strain_limit": style.STRAIN_LIMIT,
+        "opacity": style.OPACITY,
         "strain_colours": [to_hex(colour) for colour in colormaps[style.SIGNED](np.linspace(0, 1, 17))],
         "clips": clips(comparison) if comparison else None,
         "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
@@ -87,8 +90,11 @@ def _context(repository: Repository) -> dict[str, Any]:
     }
 
 
-def _colours() -> str:
-    """The colours of figures as variables of a style sheet, which replaces them where the paper is dark."""
+def _colours(tracker: int) -> str:
+    """The colours of figures, and of the tracker with a number in the clips, as variables of a style sheet.
+
+    It replaces those of the figures where the paper is dark.
+    """
     named = {name: colour for colour, name in vector.VARIABLES.items()}
-    named |= {"motion": style.MOTION, "tracked": style.TRACKED}
+    named |= {"motion": style.MOTION, "tracked": f"var(--{vector.VARIABLES[style.series_colour(tracker)]})"}
     return ":root { " + " ".join(f"--{name}: {colour};" for name, colour in named.items()) + " }\n"

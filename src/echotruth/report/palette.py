@@ -2,8 +2,8 @@
 
 from echotruth.imaging.labels import TissueLabel
 
-MOTION, TRACKED, FLOW, BORDER = "#ffb000", "#35d0ff", "#7dff6a", "#ff7ab6"
-"""Colours over images: of true paths, tracked paths, flow from frame to frame, and the true border of the wall."""
+MOTION, FLOW, BORDER = "#ffb000", "#7dff6a", "#ff7ab6"
+"""Colours over images: of true paths, flow from frame to frame, and the true border of the wall."""
 
 TAB20 = (
     *("#1f77b4", "#aec7e8", "#ff7f0e", "#ffbb78", "#2ca02c", "#98df8a", "#d62728", "#ff9896", "#9467bd", "#c5b0d5"),

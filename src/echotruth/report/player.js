@@ -6,7 +6,8 @@
   const slider = document.getElementById("frame"), clock = document.getElementById("clock");
   const play = document.getElementById("play"), course = document.getElementById("course");
   const shows = (name) => { const box = document.getElementById("show-" + name); return box && box.checked && !box.disabled; };
-  const RATE = 20, GAP = -32768;
+  const RATE = 20, GAP = -32768, SIDE = 360;
+  let unit = 1; // px of the clip in one of a clip of that side, so that marks and words are as large in all
   let clip = null, frame = 0, playing = false, last = 0;
 
   function bytes(text) {
@@ -32,6 +33,7 @@
     const phase = clip ? frame / clip.frames : 0;
     clip = prepare(view);
     frame = Math.min(Math.round(phase * clip.frames), clip.frames - 1);
+    unit = clip.width / SIDE;
     const density = Math.max(2, Math.ceil(720 / clip.width));
     canvas.width = clip.width * density;
     canvas.height = clip.height * density;
@@ -53,7 +55,7 @@
   }
 
   function drawMotion(array, count, numbers, colour, ring) {
-    pen.lineWidth = 1.1;
+    pen.lineWidth = 1.1 * unit;
     pen.strokeStyle = pen.fillStyle = colour;
     numbers.forEach((k) => {
       const now = at(array, count, frame, k);
@@ -69,7 +71,7 @@
       }
       pen.globalAlpha = 1;
       pen.beginPath();
-      pen.arc(now[0], now[1], ring ? 2.6 : 2, 0, 7);
+      pen.arc(now[0], now[1], (ring ? 3 : 2) * unit, 0, 7);
       if (ring) pen.stroke(); else pen.fill();
     });
   }
@@ -86,7 +88,7 @@
       pen.drawImage(picture, column * box[0], row * box[1], box[0], box[1], 0, 0, box[0], box[1]);
     };
     drawn(clip.picture);
-    pen.globalAlpha = 0.6;
+    pen.globalAlpha = canvas.dataset.opacity;
     if (shows("strain")) drawn(clip.tint);
     pen.globalAlpha = 1;
     if (shows("true")) drawMotion(clip.paths, clip.points, clip.chosen, colour("motion"), false);
@@ -95,13 +97,13 @@
     }
     pen.globalAlpha = 1;
     pen.fillStyle = pen.strokeStyle = "#fff";
-    pen.lineWidth = 2;
+    pen.lineWidth = 2 * unit;
     pen.beginPath();
-    pen.moveTo(12, clip.height - 10);
-    pen.lineTo(12 + clip.bar_px, clip.height - 10);
+    pen.moveTo(12 * unit, clip.height - 10 * unit);
+    pen.lineTo(12 * unit + clip.bar_px, clip.height - 10 * unit);
     pen.stroke();
-    pen.font = "11px system-ui, sans-serif";
-    pen.fillText(clip.bar, 12, clip.height - 16);
+    pen.font = `${11 * unit}px system-ui, sans-serif`;
+    pen.fillText(clip.bar, 12 * unit, clip.height - 16 * unit);
     const name = frame === 0 ? " ED" : frame === clip.es ? " ES" : "";
     slider.value = frame;
     clock.textContent = clip.time_ms[frame].toFixed(0) + " ms" + name;
@@ -134,7 +136,7 @@
       return `<path d="${pieces}" fill="none" stroke="${colour}" stroke-width="${width}"/>`;
     };
     parts.push(line(clip.course.true, "var(--ink)", 2.6));
-    if (clip.course.tracked) parts.push(line(clip.course.tracked, "var(--series-0)", 1.5));
+    if (clip.course.tracked) parts.push(line(clip.course.tracked, "var(--tracked)", 1.5));
     parts.push(`<line id="cursor" y1="${BOX.top}" y2="${BOX.height - BOX.bottom}" stroke="var(--muted)" stroke-width="1.2"/>`);
     const end = clip.time_ms[clip.frames - 1];
     parts.push(`<text x="${BOX.left}" y="${BOX.height - 8}">0</text>`);

@@ -19,6 +19,8 @@ SPREAD = 0.28
 def draw(measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Figure:
     """Draw a panel for each measure: a dot for every heart, and median and quartiles of each finding.
 
+    A measure that is known of no heart has no panel.
+
     Parameters
     ----------
     measures : mapping of str to ndarray of shape (heart,)
@@ -26,12 +28,15 @@ def draw(measures: Mapping[str, np.ndarray], diagnoses: np.ndarray) -> Figure:
     diagnoses : ndarray of shape (heart,), str
         Findings joined by +; a heart is a dot of each of its own.
     """
+    known = {label: values for label, values in measures.items() if np.isfinite(values).any()}
+    if not known:
+        return style.sentence("No measure of these hearts is known.")
     found = [str(words).split("+") for words in diagnoses]
     names = sorted({name for each in found for name in each}, key=lambda name: (name != "healthy", name))
     has = {name: np.array([name in each for each in found]) for name in names}
     figure = style.figure(9.6, 1.3 + 0.42 * len(names))
-    panels = figure.subplots(1, len(measures), sharey=True, squeeze=False)[0]
-    for panel, (label, values) in zip(panels, measures.items(), strict=True):
+    panels = figure.subplots(1, len(known), sharey=True, squeeze=False)[0]
+    for panel, (label, values) in zip(panels, known.items(), strict=True):
         for place, name in enumerate(names):
             _finding(panel, values[has[name] & np.isfinite(values)], place)
         panel.set_xlabel(label)

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 
 import matplotlib
 import numpy as np
+from cycler import cycler
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -19,7 +20,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from echotruth.report.palette import BORDER, FLOW, MOTION, TRACKED  # noqa: F401
+from echotruth.report.palette import BORDER, FLOW, MOTION  # noqa: F401
 from echotruth.units import mmHg
 
 INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#ffffff"
@@ -116,9 +117,12 @@ what has none."""
 STRAIN_LIMIT = 30.0
 """Strain at the ends of the scale over images, %."""
 
-SERIES = ("#7b3fa0", "#d1477e", "#b58900", "#3aa7d9", "#7a4b2a", "#5a9e1e")
-"""Colours of trackers, in the order of their ranks, and of states of hearts: none is that of a quantity.
-Further trackers are grey."""
+OPACITY = 0.4
+"""Of the colours of strain over images, through which the speckle is seen."""
+
+SERIES = ("#b04be0", "#d1477e", "#17aede", "#5a9e1e", "#b58900", "#7a4b2a")
+"""Colours of trackers, in the order of the configuration, and of states of hearts: none is that of a quantity. They are
+seen on white paper and, the first four, beside true paths over images. Further trackers are grey."""
 
 SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
 """Colour and marker of the image sizes, the largest first."""
@@ -127,7 +131,7 @@ SIZES = (("#173f73", "o"), ("#3f83cc", "s"), ("#8fb7e3", "v"))
 NO_METADATA = {"Date": None, "Creator": None, "Format": None, "Type": None}
 """Metadata of an SVG: none, so that nothing but the figure is in it."""
 
-styled = matplotlib.rc_context(fname=Path(__file__).with_name("figure.mplstyle"))
+styled = matplotlib.rc_context({"axes.prop_cycle": cycler(color=SERIES)}, Path(__file__).with_name("figure.mplstyle"))
 """Decorator of functions that draw a figure."""
 
 
@@ -241,7 +245,7 @@ def volume(largest: float) -> Quantity:
 
 
 def series_colour(number: int) -> str:
-    """Colour of the tracker with a place in the ranking, counted from 0."""
+    """Colour of the tracker with a place in the configuration, counted from 0."""
     return SERIES[number] if number < len(SERIES) else TARGET
 
 

@@ -21,9 +21,12 @@ class Graph:
     ----------
     name : str
         Under which it is found in the document.
+    colours : dict
+        Tracker -> its colour.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, colours: dict[str, str]) -> None:
+        self._colours = {TRUE: style.TRUTH} | {key: one.colour for key, one in style.QUANTITIES.items()} | colours
         # On the layer above the curves, which then need not be drawn again when it moves.
         upright = {"dimension": "height", "location": 0}
         self.cursor = Span(**upright, line_color="#cc3311", line_width=1.5, level="overlay", name=f"cursor_{name}")
@@ -70,7 +73,7 @@ class Graph:
         self._fit(time, list(curves.values()))
         for number, line in enumerate(self._lines):
             line.visible = number < len(names)
-            line.glyph.line_color = _colour(names, number)
+            line.glyph.line_color = self._colours[names[number] if number < len(names) else TRUE]
         if names != self._names:  # other models make Bokeh look through the whole page
             self._names = names
             self._legend.items = [LegendItem(label=name, renderers=[self._lines[n]]) for n, name in enumerate(names)]
@@ -86,11 +89,3 @@ class Graph:
         margin = 0.06 * (high - low) or 1.0
         self.figure.y_range.update(start=low - margin, end=high + margin)
         self.figure.x_range.update(start=float(time[0]), end=float(time[-1]) if len(time) > 1 else float(time[0]) + 1)
-
-
-def _colour(names: list[str], number: int) -> str:
-    """Colour of a curve: that of the quantity if it is one, of the truth, or of the tracker by its place."""
-    name = names[number] if number < len(names) else TRUE
-    if name in style.QUANTITIES:
-        return style.QUANTITIES[name].colour
-    return style.TRUTH if name == TRUE else style.series_colour(number - (TRUE in names))

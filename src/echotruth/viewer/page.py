@@ -12,6 +12,7 @@ from bokeh.document import Document
 from bokeh.layouts import column, row
 from bokeh.models import CheckboxButtonGroup, ColumnDataSource, Div, Range1d, Select, Slider, Toggle
 
+from echotruth.report import style
 from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
 from echotruth.viewer import arrows, curves, facts, script
@@ -55,11 +56,12 @@ class Page:
         self.frame = Slider(start=0, end=frames - 1, value=choice.frame or 0, title="Frame", name="frame")
         self.frame.update(sizing_mode="stretch_width", max_width=380)
         self.side = Slider(start=0, end=1e6, value=1, visible=False)
-        self.opacity = Slider(start=0, end=1, step=0.05, value=0.6, title="Opacity", width=110)
+        self.opacity = Slider(start=0, end=1, step=0.05, value=style.OPACITY, title="Opacity", width=110)
         ranges = Range1d(-1, 1), Range1d(2, 0)
         self.pointer, sliders = Div(name="pointer", height=20), (self.frame, self.side)
         self.panels = [Panel(self.clip, sliders, ranges, self.pointer, name) for name in ("first", "second")]
-        self.graphs = {name: Graph(name) for name in ("strain", "rotation", "volume")}
+        self.colours = {name: style.series_colour(number) for number, name in enumerate(repository.trackers)}
+        self.graphs = {name: Graph(name, self.colours) for name in ("strain", "rotation", "volume")}
         self._widgets()
         self._scripts()
         document.add_root(self._layout())
@@ -114,13 +116,16 @@ class Page:
         self.play.js_on_change("active", address)
         self.frame.js_on_change("value_throttled", address)
         figures, graphs = ([one.figure for one in shown] for shown in (self.panels, self.graphs.values()))
-        self.document.js_on_event("document_ready", script.callback("fit", figures=figures, graphs=graphs))
+        fit = script.callback("fit", figures=figures, graphs=graphs, facts=self.facts)
+        self.document.js_on_event("document_ready", fit)
 
     def _layout(self) -> Any:
         chosen = self.inputs
         apart = {"flex-wrap": "wrap", "gap": "4px"}
-        clip = row(*(chosen[name] for name in ("case", "view", "size", "tracker", "other")), styles=apart)
         switches = column(Div(text="Motion", margin=(5, 5, 0, 5)), self.arrows)
+        clip = row(*(chosen[name] for name in ("case", "view", "size", "tracker", "other")), styles=apart)
+        for widget in clip.children:  # narrower where the window is
+            widget.styles = {"flex": f"1 1 {0.7 * widget.width:.0f}px", "max-width": f"{widget.width}px"}
         drawn = row(chosen["colour"], chosen["component"], self.opacity, switches, styles=apart)
         pictures = row(*(panel.figure for panel in self.panels), styles=apart)
         player = row(self.play, self.frame, self.rate, sizing_mode="stretch_width", styles={"align-items": "center"})
@@ -224,6 +229,7 @@ class Page:
         if not panel.figure.visible:
             return
         followed = None if tracker in (TRUTH, NOTHING) else tracker
+        panel.follow(self.colours.get(tracker, style.SERIES[0]))
         panel.figure.title.text = "Truth" if tracker == TRUTH else tracker or "no tracker"
         place = (choice.case, choice.view, choice.size, tracker)
         try:

@@ -13,8 +13,8 @@ from echotruth.viewer.tint import Tint
 
 SIDE = 520
 """Of a picture on the screen until the window's width is known, px."""
-ARROWS = {"true": style.MOTION, "tracked": style.TRACKED, "flow": style.FLOW}
-"""Kind of paths or arrows to their colour."""
+ARROWS = {"true": style.MOTION, "tracked": style.SERIES[0], "flow": style.FLOW}
+"""Kind of paths or arrows to their colour; tracked ones have that of their tracker."""
 PATHS = ("true", "tracked")
 """Those of them that are paths."""
 EMPTY = np.zeros(0, np.float32)
@@ -127,6 +127,11 @@ class Panel:
         self.bar.ticker.ticks = list(tint.names) or MaxNLocator(6, steps=(1, 2, 5, 10)).tick_values(tint.low, tint.high)
         self.bar.update(title=tint.title, visible=True, major_label_overrides=tint.names)
         self.colour.data = {"index": [tint.index]}
+
+    def follow(self, colour: str) -> None:
+        """Give tracked paths the colour of another tracker."""
+        line, head = self._renderers["tracked"]
+        line.glyph.line_color = head.glyph.fill_color = colour
 
     def move(self, kind: str, arrows: Arrows | None) -> None:
         """Show other arrows of a kind, or none."""
