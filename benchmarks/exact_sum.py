@@ -9,7 +9,8 @@ It is what :class:`~echotruth.imaging.rf.full_matrix.FullMatrix` approximates, a
 
 with the pulse P of centre frequency f0, the amplitude a of a scatterer and its exponent n, and for each element its
 distance r and angle theta to a scatterer at elevation y, its range r' in the plane of the image, width w, height H and
-elevation focus F, and the attenuation alpha.
+elevation focus F, and the attenuation alpha. A harmonic is sent with E(f / 2)^2 in place of E(f), and is the mean of
+S_ij and S_ji.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ def exact_matrix(
     *,
     exponent: Floats | float = 0.0,
     elevation: bool = True,
+    harmonic: bool = False,
     rib: Rib | None = None,
 ) -> Spectra:
     """Echoes S between all pairs.
@@ -51,6 +53,8 @@ def exact_matrix(
         Power of the frequency that the amplitude follows.
     elevation : bool
         Whether the lens is there; without it E = 1.
+    harmonic : bool
+        Whether the wave is sent at half of the frequency.
     rib : Rib, optional
         Each way u is multiplied by its transmission.
 
@@ -59,14 +63,22 @@ def exact_matrix(
     ndarray of shape (bins, elements, elements), 1/m^2
     """
     passes = rib.transmission(position, element_centres(probe)).T if rib else 1.0
-    waves = (passes * one_way(probe, position, f, elevation=elevation) for f in frequency)
-    pulse = pulse_spectrum(probe, frequency)
-    scattered = (amplitude * (f / (probe.frequency_MHz * MHz)) ** exponent for f in frequency)
-    return np.array([p * (wave * a) @ wave.T for p, a, wave in zip(pulse, scattered, waves, strict=True)])
+    matrix = []
+    for f, pulse in zip(frequency, pulse_spectrum(probe, frequency), strict=True):
+        wave = sent = passes * one_way(probe, position, f, elevation=elevation)
+        if harmonic:
+            sent = passes * one_way(probe, position, f, elevation=elevation, sent=True)
+        scattered = amplitude * (f / (probe.frequency_MHz * MHz)) ** exponent
+        echoes = pulse * (wave * scattered) @ sent.T
+        matrix.append((echoes + echoes.T) / 2)
+    return np.array(matrix)
 
 
-def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool = True) -> Spectra:
-    """Wave u of every element at every scatterer (n, 3), m, at a frequency, Hz: (elements, scatterers), 1/m."""
+def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool = True, sent: bool = False) -> Spectra:
+    """Wave u of every element at every scatterer (n, 3), m, at a frequency, Hz: (elements, scatterers), 1/m.
+
+    That of the harmonic of what is `sent`, if it is at half of the frequency.
+    """
     speed = probe.sound_speed_m_per_s
     lateral = position[:, 0] - element_centres(probe)[:, None]
     distance = np.sqrt(lateral**2 + position[:, 1] ** 2 + position[:, 2] ** 2)
@@ -74,7 +86,9 @@ def one_way(probe: Probe, position: Floats, frequency: float, *, elevation: bool
     directivity = np.sinc(probe.width_um * um * frequency / speed * lateral / distance) * position[:, 1] / distance
     attenuation = probe.attenuation_dB_per_cm_MHz * 100 / 1e6 * np.log(10) / 20  # nepers per metre and hertz
     wave = directivity * np.exp(-(attenuation + 2j * np.pi / speed) * frequency * distance) / distance
-    return wave * fresnel(probe, position, frequency) if elevation else wave
+    if not elevation:
+        return wave
+    return wave * (fresnel(probe, position, frequency / 2) ** 2 if sent else fresnel(probe, position, frequency))
 
 
 def pulse(probe: Probe, time: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from scipy.optimize import brentq
 from echotruth.config import Probe
 from echotruth.imaging.flow import fresnel
 from echotruth.imaging.rf.elevation import BEAM_TAIL_ENERGY, Lens
+from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.kernel import Band, Grid
 
 WAVELENGTH = 1540 / 25e6
@@ -101,3 +102,68 @@ def test_echoes_from_near_the_array_or_far_beside_its_plane_are_not_spread(lens)
     aside = np.array([3e-3, 0.0, 0.0])
     assert lens.spreads(at(np.array([0.0, 0.2e-3, 1.4e-3]), 6.5e-3) + aside).tolist() == [True, True, False]
     assert not lens.spreads(at(np.array([0.0]), 2e-3)).any()
+
+
+HUMAN = Probe(preset="human_2_7MHz", elements=3, frequency_MHz=3.4, bandwidth=0.111)
+"""Of the human array with `realism: {preset: human}`, elements in its middle."""
+
+
+@pytest.fixture(scope="module")
+def second_harmonic():
+    return FullMatrix(HUMAN, 120e-3, harmonic=True)
+
+
+def over_the_height(frequency, depth, beside):
+    """Response of an element at frequencies (n,): the mean over its height along exact paths, with a perfect lens."""
+    node, weight = np.polynomial.legendre.leggauss(200)
+    height, focus = 7e-3 * node, 60e-3
+    path = np.hypot(depth, beside - height) - np.hypot(depth, beside) - (np.hypot(focus, height) - focus)
+    return np.exp(-2j * np.pi / 1540 * np.multiply.outer(frequency, path)) @ weight / 2
+
+
+def response(matrix, depth, beside=0.0):
+    """That of the lens to a point, from the middle element and back to it, (bins,)."""
+    spectrum, point = matrix(np.array([[0.0, depth, beside]]), np.ones(1))[:, 1, 1], np.hypot(depth, beside)
+    pulse = np.exp(-(((matrix.frequency - 3.4e6) / (0.111 * 3.4e6)) ** 2) * 4 * np.log(2))
+    return spectrum / pulse * point**4 / depth**2 * np.exp(4j * np.pi / 1540 * matrix.frequency * point)
+
+
+@pytest.mark.parametrize(
+    "depth, beside, error",
+    [(25e-3, 0.0, 0.1), (30e-3, 0.0, 0.05), (30e-3, 1.5e-3, 0.06), (40e-3, 0.0, 0.02), (40e-3, 1e-3, 0.03)]
+    + [(60e-3, 0.0, 0.01), (60e-3, 1e-3, 0.01), (110e-3, 0.0, 0.01), (110e-3, 3e-3, 0.01)],
+)
+def test_harmonic_is_sent_at_half_the_frequency_and_squared(second_harmonic, depth, beside, error):
+    frequency = second_harmonic.frequency
+    exact = over_the_height(frequency / 2, depth, beside) ** 2 * over_the_height(frequency, depth, beside)
+    found = response(second_harmonic, depth, beside)
+    band = np.abs(frequency - 3.4e6) < 0.3e6
+    assert np.linalg.norm((found - exact)[band]) < error * np.linalg.norm(exact[band])
+
+
+def farther(frequency, response):
+    """How much farther than it is a point of this response appears: where its pulse is strongest, m."""
+    beyond = np.linspace(-0.3e-3, 0.3e-3, 1201)
+    pulse = np.exp(-(((frequency - 3.4e6) / (0.111 * 3.4e6)) ** 2) * 4 * np.log(2))
+    echo = np.exp(4j * np.pi / 1540 * np.multiply.outer(beyond, frequency)) @ (pulse * response)
+    return beyond[np.abs(echo).argmax()]
+
+
+@pytest.mark.parametrize(
+    "depth, shift", [(22, -38), (26, 54), (30, -10), (34, 39), (38, 58), (45, 42), (60, 0), (80, -33), (110, -53)]
+)
+def test_a_point_appears_where_the_documentation_says_and_where_exact_paths_put_it(second_harmonic, depth, shift):
+    """To 30 um where Fresnel's approximation is poor, and to 5 um from 26 mm on."""
+    frequency = second_harmonic.frequency
+    found = farther(frequency, response(second_harmonic, depth * 1e-3))
+    exact = [over_the_height(multiple * frequency, depth * 1e-3, 0.0) for multiple in (0.5, 1)]
+    assert found == pytest.approx(shift * 1e-6, abs=2e-6)
+    assert found == pytest.approx(farther(frequency, exact[0] ** 2 * exact[1]), abs=30e-6 if depth < 26 else 5e-6)
+
+
+@pytest.mark.parametrize("depth", [45, 50, 80, 110])
+def test_near_the_focus_a_point_is_nearer_by_the_mean_path_over_the_height(second_harmonic, depth):
+    """H^2 / 24 (1/F - 1/r), the mean of h^2 / 2 (1/F - 1/r), to a tenth, and to a seventh at 110 mm."""
+    nearer = 14e-3**2 / 24 * (1 / 60e-3 - 1e3 / depth)
+    found = farther(second_harmonic.frequency, response(second_harmonic, depth * 1e-3))
+    assert -found == pytest.approx(nearer, rel=0.1 if depth < 100 else 0.15)

@@ -226,6 +226,14 @@ def test_slice_is_as_thick_as_a_squared_sinc_in_the_focus():
         assert beam_thickness(p, np.array([focus]))[0] == pytest.approx(expected, rel=1e-3)
 
 
+def test_slice_of_a_harmonic_is_as_thick_as_a_sinc_times_the_square_of_one_twice_as_wide_in_the_focus():
+    """sinc(u) sinc^2(u / 2) is half its maximum at 0.5109."""
+    expected = 2 * 0.5109 * 1540 / 25e6 * 6.5
+    assert beam_thickness(Probe(), np.array([6.5e-3]), harmonic=True)[0] == pytest.approx(expected, rel=1e-3)
+    thickness = [slice_thickness(et.configure(**{"rf.harmonic": each}), np.array(6.5e-3)) for each in (False, True)]
+    assert thickness[1] / thickness[0] == pytest.approx(0.5109 / 0.4429, rel=0.01)
+
+
 @pytest.mark.parametrize("depth", [5e-3, 8e-3])
 def test_echo_from_the_edge_of_the_slice_is_half_of_that_from_the_plane(depth):
     """Of the engine that makes the RF, over its whole band, of which the centre frequency stands for the beam."""

@@ -96,15 +96,16 @@ def test_behind_a_rib_the_rf_is_the_exact_sum_of_what_passes(preset, scale, dept
     assert relative(shaded, exact) < 1.5 * PLANE_ACCURACY < 1e-3 * relative(clear, exact)
 
 
-def lens_errors(probe, depth, beside, bands):
+def lens_errors(probe, depth, beside, bands, harmonic=False):
     """Relative L2 error of scatterers in the beam for each band of ranges, mm, at a dozen frequencies."""
-    matrix, errors = FullMatrix(probe, depth), []
+    matrix, errors = FullMatrix(probe, depth, harmonic=harmonic), []
     some = slice(None, None, len(matrix.frequency) // 12)
     for nearest, farthest in bands:
         position, amplitude = sector(60, elevation=beside, nearest=nearest * 1e-3, farthest=farthest * 1e-3)
         inside = matrix.in_beam(position)
         scatterers = position[inside], amplitude[inside]
-        errors.append(relative(matrix(*scatterers)[some], exact_matrix(probe, *scatterers, matrix.frequency[some])))
+        exact = exact_matrix(probe, *scatterers, matrix.frequency[some], harmonic=harmonic)
+        errors.append(relative(matrix(*scatterers)[some], exact))
     return np.array(errors)
 
 
@@ -120,6 +121,21 @@ def lens_errors(probe, depth, beside, bands):
 def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges(preset, attenuation, depth, beside, bands):
     probe = Probe(preset=preset, attenuation_dB_per_cm_MHz=attenuation)
     assert (lens_errors(probe, depth, beside, bands) < LENS_ACCURACY).all()
+
+
+@pytest.mark.parametrize(
+    "preset, depth, beside, bands",
+    [
+        ("mouse_25MHz", DEPTH, 0.5e-3, [(1, 2), (2, 3.5), (3.5, 11)]),
+        pytest.param("human_2_7MHz", 120e-3, 7e-3, [(12, 18), (25, 40), (60, 120)], marks=pytest.mark.slow),
+    ],
+)
+def test_under_the_lens_the_rf_of_a_harmonic_is_the_product_of_the_beam_at_half_the_frequency_squared_and_the_beam(
+    preset, depth, beside, bands
+):
+    """In a band for which six frequencies determine the sum near the array, and in one for which three do."""
+    probe = Probe(preset=preset, bandwidth=0.5 if preset == "mouse_25MHz" else 0.11, attenuation_dB_per_cm_MHz=0.5)
+    assert (lens_errors(probe, depth, beside, bands, harmonic=True) < LENS_ACCURACY).all()
 
 
 def test_behind_a_rib_near_the_array_the_rf_under_the_lens_is_the_exact_sum_of_what_passes():
@@ -177,13 +193,13 @@ def test_scatterers_out_of_the_record_or_the_beam_are_left_out(matrix):
     assert matrix.in_beam(np.array([[0.0, 6.5e-3, 0.0]])).all()
 
 
-@pytest.mark.parametrize("elevation", [True, False])
-def test_bytes_do_not_depend_on_threads(elevation):
+@pytest.mark.parametrize("options", [{}, {"harmonic": True}, {"elevation": False}])
+def test_bytes_do_not_depend_on_threads(options):
     position, amplitude = sector(2000, elevation=5e-4, nearest=1e-3)
     results = []
     for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
         numba.set_num_threads(threads)
-        results.append(FullMatrix(Probe(), DEPTH, elevation=elevation)(position, amplitude).tobytes())
+        results.append(FullMatrix(Probe(), DEPTH, **options)(position, amplitude).tobytes())
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     assert results[0] == results[1]
 

@@ -74,28 +74,31 @@ def slice_thickness(config: Config, range_: Floats) -> Floats:
     """
     if config.phantom.in_plane_only or not config.rf.elevation_beam:
         return np.full(np.shape(range_), np.inf)
-    return np.interp(range_, *_table(config.probe, config.bmode.field_of_view_mm * mm))
+    return np.interp(range_, *_table(config.probe, config.bmode.field_of_view_mm * mm, config.rf.harmonic))
 
 
 @lru_cache(maxsize=64)
-def _table(probe: Probe, farthest: float) -> tuple[Floats, Floats]:
+def _table(probe: Probe, farthest: float, harmonic: bool) -> tuple[Floats, Floats]:
     """Ranges up to the farthest, m, and the thickness of the beam there, m."""
     nearest = probe.height_mm * mm
     range_ = np.linspace(nearest, max(nearest, farthest), _RANGES)
-    return range_, beam_thickness(probe, range_)
+    return range_, beam_thickness(probe, range_, harmonic)
 
 
-def beam_thickness(probe: Probe, range_: Floats) -> Floats:
+def beam_thickness(probe: Probe, range_: Floats, harmonic: bool = False) -> Floats:
     """Two-way -6 dB width of the beam in elevation at the centre frequency.
 
     The lens has the same response E on transmit and on receive (:func:`fresnel`), so that an
     echo has the amplitude |E|^2. In the focus that is sinc^2(H y / (lambda F)), half its maximum at 0.443 lambda F / H.
+    A harmonic is sent with the square of E at half the frequency: sinc(u) sinc^2(u / 2), half its maximum at u = 0.511.
 
     Parameters
     ----------
     probe : Probe
     range_ : ndarray of shape (n,), m
         From the centre of the array.
+    harmonic : bool
+        Whether the wave is sent at half of the frequency.
 
     Returns
     -------
@@ -108,7 +111,9 @@ def beam_thickness(probe: Probe, range_: Floats) -> Floats:
     greatest = height / 2 * np.abs(1 - range_ / focus) + range_ * probe.sound_speed_m_per_s / frequency / height
     elevation = np.linspace(0, greatest, _ELEVATIONS, axis=-1)
     position = np.stack(np.broadcast_arrays(0.0, range_[:, None], elevation), axis=-1).reshape(-1, 3)
-    echo = np.abs(fresnel(one, position, frequency)[0].reshape(elevation.shape)) ** 2
+    received = np.abs(fresnel(one, position, frequency)[0])
+    sent = np.abs(fresnel(one, position, frequency / 2)[0]) ** 2 if harmonic else received
+    echo = (received * sent).reshape(elevation.shape)
     over = echo - echo.max(axis=1, keepdims=True) / 2
     rows, last = np.arange(len(over)), _ELEVATIONS - 1 - np.argmax(over[:, ::-1] >= 0, axis=1)
     inner, outer = over[rows, last], over[rows, last + 1]

@@ -117,7 +117,7 @@ def sample_ranges(probe: Probe, depth: float) -> np.ndarray:
 def full_matrix(probe: Probe, rf: Rf, depth: float, latest: float = 0.0) -> FullMatrix:
     """The echoes from which lines of a depth, m, are made with delays of up to `latest`, s."""
     farthest = np.hypot(*sample_positions(scan_lines(probe, rf), sample_ranges(probe, depth))).max()
-    return FullMatrix(probe, farthest, latest, rf.elevation_beam)
+    return FullMatrix(probe, farthest, latest, rf.elevation_beam, rf.harmonic)
 
 
 class _ZoneBeamformer:

@@ -3,9 +3,10 @@
 An element of height H with a lens of focus F responds to a point at elevation y and range r in the plane with the
 Fresnel integral E(f) = 1/H int exp(-i k [h^2/2 (1/r - 1/F) - h y/r]) dh over its height, k = 2 pi f / c, relative to
 the straight path to its centre (Goodman, Introduction to Fourier Optics, section 4.2). The echo of a pair has E_i E_j.
-E is taken at the mean of the least and greatest 1/r of the elements, its delay apart, and corrected for each of them to
-first order in 1/r. Where they see a scatterer at ranges too different for that, echoes are summed frequency by
-frequency (:mod:`~echotruth.imaging.rf.frequency_sum`).
+A second harmonic comes from a wave that is sent at f/2, and has its square: the echo has E(f/2)^2 of one element and
+E(f) of the other, here the mean of both ways. These products are taken at the mean of the least and greatest 1/r of the
+elements, their delay apart, and corrected for each of them to first order in 1/r. Where they see a scatterer at ranges
+too different for that, echoes are summed frequency by frequency (:mod:`~echotruth.imaging.rf.frequency_sum`).
 """
 
 from functools import cached_property
@@ -45,9 +46,14 @@ class Lens:
     max_range : float
         Greatest range, m.
     band : Band
+    harmonic : bool
+        Whether echoes are those of the second harmonic of what is sent.
 
     Attributes
     ----------
+    power : int
+        Power of `beam` that is the response of a pair: 2, and 1 for a harmonic, where `beam` is E(f) E(f/2)^2 without
+        the delay of both ways, and the derivative half of that of a pair.
     curvature : ndarray of shape (CURVATURES,), 1/m
         1/range.
     slope : ndarray of shape (slopes,)
@@ -65,24 +71,29 @@ class Lens:
         energy of all at that range.
     """
 
-    def __init__(self, probe: Probe, max_range: float, band: Band) -> None:
+    def __init__(self, probe: Probe, max_range: float, band: Band, harmonic: bool = False) -> None:
         height, centre = probe.height_mm * mm, probe.frequency_MHz * MHz
         slopes = int(SLOPES_PER_BEAMWIDTH * MAX_SLOPE * height * centre / probe.sound_speed_m_per_s) + 2
         self.slope = np.linspace(0, MAX_SLOPE, slopes)
         self.curvature = np.linspace(min(1 / max_range, 1 / height), 2 / height, CURVATURES)
-        beam, derivative = self._fresnel_integrals(probe, band)
+        beam, derivative = self._fresnel_integrals(probe, band.frequency)
+        if harmonic:
+            sent, change = self._fresnel_integrals(probe, band.frequency / 2)
+            derivative = sent * (sent * derivative / 2 + beam * change)
+            beam = beam * sent**2
+        self.power = 1 if harmonic else 2
         angular_frequency = 2 * np.pi * centre
         self.log_derivative = _log_derivative(beam, derivative, band, centre)
-        self.delay = _delays(beam**2, band) / 2
+        self.delay = _delays(beam**self.power, band) / 2
         # Traces are damped by arrival time, but attenuation depends on path length: compensate for the lens delay.
         undamped = band.loss + 2j * np.pi * band.frequency
-        advance = np.exp(np.multiply.outer(self.delay, undamped))
+        advance = np.exp(np.multiply.outer(2 / self.power * self.delay, undamped))
         phase_slope = np.multiply.outer(self.log_derivative.imag, undamped / angular_frequency)
         derivative -= (self.log_derivative.real[..., None] + phase_slope) * beam
         self.derivative_residual = (advance * derivative).astype(np.complex64)
         self.beam = (advance * beam).astype(np.complex64)
-        self.edge_slope = _edge_slope(self.beam**2, band, self.slope)
-        self._band, self._response = band, _response(self.beam, band)
+        self.edge_slope = _edge_slope(self.beam**self.power, band, self.slope)
+        self._band, self._response = band, _response(np.abs(self.beam) ** (self.power / 2), band)
         self._half_aperture, self._height = (probe.elements - 1) * (probe.pitch_um * um) / 2, height
         self._wavenumber = angular_frequency / probe.sound_speed_m_per_s
 
@@ -92,7 +103,7 @@ class Lens:
 
         They take a third of the time to set up the tables, and who only asks what is in the beam needs none.
         """
-        return _blocks(self.beam**2, self._band)
+        return _blocks(self.beam**self.power, self._band)
 
     def in_beam(self, position: Floats) -> NDArray[np.bool_]:
         """Which scatterers at positions (n, 3), m, are within the beam, (n,)."""
@@ -134,9 +145,9 @@ class Lens:
         _look_up(curvature, beside, grid, self.log_derivative, self.delay, sound_speed, index, terms)
         return index, terms
 
-    def _fresnel_integrals(self, probe: Probe, band: Band) -> tuple[NDArray, NDArray]:
+    def _fresnel_integrals(self, probe: Probe, frequency: Floats) -> tuple[NDArray, NDArray]:
         """E, and its derivative with respect to 1/range at a fixed elevation, (CURVATURES, slopes, NODES)."""
-        size, wavenumber = probe.height_mm * mm, 2 * np.pi * band.frequency / probe.sound_speed_m_per_s
+        size, wavenumber = probe.height_mm * mm, 2 * np.pi * frequency / probe.sound_speed_m_per_s
         defocus = self.curvature - 1 / (probe.elevation_focus_mm * mm)
         phase = wavenumber.max() * size / 2 * (MAX_SLOPE + np.abs(defocus).max() * size / 4)
         node, weight = np.polynomial.legendre.leggauss(32 + int(phase))
@@ -216,11 +227,11 @@ def _edge_slope(spectrum: NDArray, band: Band, slope: Floats) -> Floats:
     return slope[np.minimum((outside > BEAM_TAIL_ENERGY).sum(axis=1), len(slope) - 1)]
 
 
-def _response(beam: NDArray, band: Band) -> Floats:
+def _response(magnitude: Floats, band: Band) -> Floats:
     """Greatest |E| (curvatures, slopes, NODES) at a slope and beyond, over the greatest of all: (curvatures, slopes).
 
     Where E is 0 it differs between elements all the same.
     """
-    amplitude = np.sqrt((np.abs(beam) ** 2 * band.weight).sum(axis=-1))
+    amplitude = np.sqrt((magnitude**2 * band.weight).sum(axis=-1))
     envelope = np.maximum.accumulate(amplitude[:, ::-1], axis=1)[:, ::-1]
     return envelope / envelope[:, :1]

@@ -8,7 +8,8 @@ frequencies determine all others.
 The Fresnel integral of the lens is, with a and b proportional to frequency, half the integral of exp(-i (a t^2 - b t))
 over t from -1 to 1. It is the sum of three waves: one from the edge of the element at each end, and, if it is inside,
 one from the point t0 = b / 2a where the phase stands still. Apart from the delay of its path, and from the root of the
-frequency, by which it falls, each changes so little with frequency that its values at a few determine all.
+frequency, by which it falls, each changes so little with frequency that its values at a few determine all. A harmonic
+is sent as the square of the sum of these waves at half of the frequency.
 """
 
 from __future__ import annotations
@@ -39,8 +40,9 @@ echo, in standard deviations of the pulse in time."""
 BLOCK, GROUP = 32, 16
 """Scatterers whose waves are in the cache at a time; frequencies from each of which phases are turned to the next, and
 for every group computed anew."""
-NODES, WAVES = 6, 3
-"""Frequencies at which the waves of an element are computed, and their number."""
+MAX_NODES, NODE_TOLERANCE, WAVES = 6, 7e-4, 3
+"""Most frequencies at which the waves of an element are computed; fewer, n, are enough where (log(high / low) / 4)^n,
+which the error of the polynomial through them follows, is below the tolerance; and the number of waves."""
 SKIRT = 0.5
 """Standard deviations of the pulse's spectrum that are summed on either side of the band: cut off at its end, an echo
 would be long, and few frequencies would not determine all."""
@@ -71,16 +73,20 @@ class FrequencySum:
     sampling : float, Hz
     samples : int
         Length of the record.
+    harmonic : bool
+        Whether the wave is sent at half of the frequency, and its square received.
     """
 
-    def __init__(self, probe: Probe, sampling: float, samples: int) -> None:
+    def __init__(self, probe: Probe, sampling: float, samples: int, harmonic: bool = False) -> None:
+        self._ways = 2 if harmonic else 1
         self._sampling, self._samples = sampling, samples
         self._centre, self._pulse_width = probe.frequency_MHz * MHz, spectral_width(probe)
         (low, high), skirt, speed = pulse_band(probe), SKIRT * self._pulse_width, probe.sound_speed_m_per_s
         self._band = max(low - skirt, 0.0), high + skirt
         self._waves = low, high = max(low - skirt, LOWEST * high), high + skirt
-        node = leggauss(NODES)[0]
-        self._polynomials = np.linalg.inv(legvander(node, NODES - 1))
+        nodes = min(ceil(np.log(NODE_TOLERANCE) / np.log(min(np.log(high / low) / 4, 0.5))), MAX_NODES)
+        node = leggauss(nodes)[0]
+        self._polynomials = np.linalg.inv(legvander(node, nodes - 1))
         frequency = np.sqrt(low * high) * (high / low) ** (node / 2)
         squares = np.minimum(np.arange(STEPS + 2) / STEPS, 1)
         width = np.pi * (probe.width_um * um) * frequency / speed
@@ -154,7 +160,9 @@ class FrequencySum:
         frequency, width = np.maximum(bins * step, self._waves[0]), padded(few)
         position, amplitude, exponent, passes = scatterers
         blocks = -(-len(position) // BLOCK)
-        waves = np.zeros((blocks, WAVES, 2, NODES, BLOCK * width + ROW_PADDING), np.float32)
+        waves = np.zeros(
+            (self._ways, blocks, WAVES, 2, len(self._polynomials), BLOCK * width + ROW_PADDING), np.float32
+        )
         arrival = np.zeros((blocks, WAVES, BLOCK * width))
         inputs = (position, passes), array, self._lens, self._medium, self._tables
         share(partial(send, *inputs, waves, arrival), len(position))
@@ -162,7 +170,9 @@ class FrequencySum:
         ratio = np.log(frequency / self._centre)
         strength = np.zeros((len(bins), blocks * BLOCK), np.float32)
         growth = np.multiply.outer(ratio, exponent) - np.multiply.outer(frequency, loss)
-        strength[:, : len(position)] = (self._pulse(frequency) / frequency)[:, None] * amplitude * np.exp(growth)
+        # The waves are times the root of their frequency. Of a harmonic, the sum over both ways has its mean.
+        pulse = self._pulse(frequency) / frequency / np.sqrt(frequency) ** (self._ways - 1)
+        strength[:, : len(position)] = pulse[:, None] * amplitude * np.exp(growth)
         sums, carry = np.zeros((len(bins), 2, padded(few, HEIGHT), width), np.float32), self._carry(frequency)
         share(partial(add_echoes, waves, arrival, carry, (bins[0] * step, step), strength, sums), len(carry))
         spectra, parts = np.zeros((len(i), length // 2 + 1), np.complex64), sums.reshape(len(bins), 2, -1)
@@ -177,15 +187,15 @@ class FrequencySum:
         return np.exp(-((frequency - self._centre) ** 2) / (2 * self._pulse_width**2))
 
     def _carry(self, frequency: Floats) -> NDArray[np.float32]:
-        """Weights of the values at the nodes in those at frequencies (n,), Hz: (groups, NODES, GROUP).
+        """Weights of the values at the nodes in those at frequencies (n,), Hz: (groups, nodes, GROUP).
 
         The values are those of the polynomial in the logarithm of the frequency through the nodes.
         """
-        low, high = self._waves
+        (low, high), nodes = self._waves, len(self._polynomials)
         place = 2 * np.log(frequency / low) / np.log(high / low) - 1
-        weights = np.zeros((padded(len(frequency), GROUP), NODES), np.float32)
-        weights[: len(frequency)] = legvander(place, NODES - 1) @ self._polynomials
-        return np.ascontiguousarray(weights.reshape(-1, GROUP, NODES).transpose(0, 2, 1))
+        weights = np.zeros((padded(len(frequency), GROUP), nodes), np.float32)
+        weights[: len(frequency)] = legvander(place, nodes - 1) @ self._polynomials
+        return np.ascontiguousarray(weights.reshape(-1, GROUP, nodes).transpose(0, 2, 1))
 
 
 def _at_rest(scatterers: Scatterers, centres: Floats) -> Floats:
@@ -221,12 +231,14 @@ def send(scatterers, array, lens, medium, tables, waves, arrival, part):
     lens
         Height of the elements and focus, m, and least delay of the edges by the curvature alone, s.
     medium
-        Frequencies, Hz, shape (NODES,); speed of sound, m/s; attenuation, 1/m/Hz.
+        Frequencies, Hz, shape (nodes,); speed of sound, m/s; attenuation, 1/m/Hz.
     tables
-        Of :func:`edge_wave`, and of directivity without its cosine over the square of the sine, (STEPS + 2, NODES).
+        Of :func:`edge_wave`, and of directivity without its cosine over the square of the sine, (STEPS + 2, nodes).
     waves
-        Written: shape (blocks, WAVES, 2, NODES, BLOCK width or more), float32; real and imaginary parts, times the root
-        of the frequency and without the attenuation up to the range of the scatterer, sqrt(Hz)/m.
+        Written: shape (ways, blocks, WAVES, 2, nodes, BLOCK width or more), float32; real and imaginary parts, times
+        the root of the frequency and without the attenuation up to the range of the scatterer, sqrt(Hz)/m. The second,
+        of a harmonic, are those of half the frequencies, such that the square of their sum is the wave that is sent,
+        times half of the frequency.
     arrival
         Written: shape (blocks, WAVES, BLOCK width), s.
     part
@@ -234,10 +246,10 @@ def send(scatterers, array, lens, medium, tables, waves, arrival, part):
     """
     (position, passes), (centres, delay), (edge, directivity) = scatterers, array, tables
     frequency, speed, attenuation = medium
-    width, still = arrival.shape[2] // BLOCK, np.sqrt(np.pi / 2) / 2
+    width = arrival.shape[2] // BLOCK
     for k in range(*part):
         range_ = np.sqrt(position[k, 0] ** 2 + position[k, 1] ** 2 + position[k, 2] ** 2)
-        written, late = waves[k // BLOCK], arrival[k // BLOCK]
+        late = arrival[k // BLOCK]
         for e in range(len(centres)):
             lateral, column = position[k, 0] - centres[e], k % BLOCK * width + e
             distance, side, size, tilt = phases(lateral, position[k, 1], position[k, 2], lens, speed)
@@ -252,13 +264,23 @@ def send(scatterers, array, lens, medium, tables, waves, arrival, part):
                 strength, root = weight * between(directivity, place, n), scale * np.sqrt(frequency[n])
                 if loss:
                     strength *= np.exp(-loss * frequency[n])
-                written[0, 0, n, column] = still * strength if inside else 0.0
-                written[0, 1, n, column] = -side * still * strength if inside else 0.0
-                for end in range(2):
-                    row = EDGE_STEPS / (1 + root * abs(2 * end - 1 + centre))
-                    value = strength / 2 if end == 0 and not inside else -strength / 2
-                    written[1 + end, 0, n, column] = value * between(edge, row, 0)
-                    written[1 + end, 1, n, column] = value * side * between(edge, row, 1)
+                write_waves(waves[0, k // BLOCK, :, :, n, column], strength, root, side, centre, edge)
+                if len(waves) == 2:
+                    strength, root = np.sqrt(max(strength, 0.0) / scale), root / np.sqrt(2)
+                    write_waves(waves[1, k // BLOCK, :, :, n, column], strength, root, side, centre, edge)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def write_waves(written, strength, root, side, centre, edge):
+    """Write real and imaginary parts of the waves of an element, (WAVES, 2); `root` is that of 2 pi f a."""
+    inside, still = centre < 1, np.sqrt(np.pi / 2) / 2
+    written[0, 0] = still * strength if inside else 0.0
+    written[0, 1] = -side * still * strength if inside else 0.0
+    for end in range(2):
+        row = EDGE_STEPS / (1 + root * abs(2 * end - 1 + centre))
+        value = strength / 2 if end == 0 and not inside else -strength / 2
+        written[1 + end, 0] = value * between(edge, row, 0)
+        written[1 + end, 1] = value * side * between(edge, row, 1)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -283,12 +305,14 @@ def between(table, place, column):
 def add_echoes(waves, arrival, carry, grid, strength, sums, groups):
     """Add the echoes of some scatterers: u_i u_j times their strength, u being the sum of the waves of an element.
 
+    Those of a harmonic are u_i v_j^2 + v_i^2 u_j, v being the sum of the waves of half the frequency.
+
     Parameters
     ----------
     waves, arrival
-        As :func:`send` writes them.
+        As :func:`send` writes them; the waves in front of each other, of u and, for a harmonic, of v.
     carry
-        Weights of the frequencies of the waves in those of the sum, shape (groups, NODES, GROUP), float32.
+        Weights of the frequencies of the waves in those of the sum, shape (groups, nodes, GROUP), float32.
     grid
         First frequency and step, Hz.
     strength
@@ -299,38 +323,58 @@ def add_echoes(waves, arrival, carry, grid, strength, sums, groups):
     groups
         First of the groups of frequencies, and the one after the last.
     """
-    count, width = arrival.shape[2], sums.shape[3]
-    carried = np.empty((WAVES, 2, GROUP, count), np.float32)
-    left, right = np.empty((2 * BLOCK, width), np.float32), np.empty((2 * BLOCK, width), np.float32)
-    phase, turn = np.empty((WAVES, 2, count), np.float32), np.empty((WAVES, 2, count), np.float32)
-    for block in range(len(waves)):
-        for wave in range(WAVES):
-            turn_phase(arrival[block, wave], grid[1], turn[wave, 0], turn[wave, 1])
+    ways, count, width = len(waves), arrival.shape[2], sums.shape[3]
+    carried = np.empty((ways, WAVES, 2, GROUP, count), np.float32)
+    left, right = np.empty((2, ways, BLOCK, width), np.float32), np.empty((2, ways, BLOCK, width), np.float32)
+    left_rows, right_rows = left.reshape(2 * ways * BLOCK, width), right.reshape(2 * ways * BLOCK, width)
+    phase, turn = np.empty((ways, WAVES, 2, count), np.float32), np.empty((ways, WAVES, 2, count), np.float32)
+    for block in range(len(arrival)):
+        turn_phases(arrival[block], grid[1], turn)
         for group in range(*groups):
             first = group * GROUP
-            for wave in range(WAVES):
-                turn_phase(arrival[block, wave], grid[0] + first * grid[1], phase[wave, 0], phase[wave, 1])
-                for part in range(2):
-                    product(carry[group], waves[block, wave, part], carried[wave, part])
+            turn_phases(arrival[block], grid[0] + first * grid[1], phase)
+            for way in range(ways):
+                for wave in range(WAVES):
+                    for part in range(2):
+                        product(carry[group], waves[way, block, wave, part], carried[way, wave, part])
             for f in range(first, min(first + GROUP, len(sums))):
                 add_waves(carried, f - first, phase, turn, left)
                 multiply_rows(left, strength[f, block * BLOCK : (block + 1) * BLOCK], right)
-                product(left, right, sums[f, 0], True, True)
-                product(left[:BLOCK], right[BLOCK:], sums[f, 1], False, True)
+                product(left_rows, right_rows, sums[f, 0], True, True)
+                product(left_rows[: ways * BLOCK], right_rows[ways * BLOCK :], sums[f, 1], False, True)
 
 
 @numba.njit(cache=True)
 def add_waves(carried, n, phase, turn, total):
-    """Write the sum of the waves at the n-th frequency of a group, and turn the phase to the next.
+    """Write the sums of the waves at the n-th frequency of a group, and turn the phases to the next.
 
-    The total (2 BLOCK, width) holds the real parts of BLOCK scatterers and then the imaginary ones.
+    The total (2, ways, BLOCK, width), real parts before imaginary ones, has the square of the second sum.
     """
-    real, imaginary = total[:BLOCK].ravel(), total[BLOCK:].ravel()
-    real[:], imaginary[:] = np.float32(0), np.float32(0)
-    for wave in range(WAVES):
-        c, s = phase[wave, 0], phase[wave, 1]
-        add_turned(carried[wave, 0, n], carried[wave, 1, n], c, s, real, imaginary)
-        turn_on(c, s, turn[wave, 0], turn[wave, 1])
+    for way in range(len(carried)):
+        real, imaginary = total[0, way].ravel(), total[1, way].ravel()
+        real[:], imaginary[:] = np.float32(0), np.float32(0)
+        for wave in range(WAVES):
+            c, s = phase[way, wave, 0], phase[way, wave, 1]
+            add_turned(carried[way, wave, 0, n], carried[way, wave, 1, n], c, s, real, imaginary)
+            turn_on(c, s, turn[way, wave, 0], turn[way, wave, 1])
+        if way == 1:
+            square(real, imaginary)
+
+
+@numba.njit(cache=True)
+def square(real, imaginary):
+    """Square numbers of real and imaginary parts (n,), float32."""
+    for n in range(len(real)):
+        x, y = real[n], imaginary[n]
+        real[n], imaginary[n] = x * x - y * y, x * y + x * y
+
+
+@numba.njit(cache=True)
+def turn_phases(time, frequency, phase):
+    """Write :func:`turn_phase` of times (WAVES, n), s, at a frequency, and at half of it: (ways, WAVES, 2, n)."""
+    for way in range(len(phase)):
+        for wave in range(WAVES):
+            turn_phase(time[wave], frequency / (1 + way), phase[way, wave, 0], phase[way, wave, 1])
 
 
 @numba.njit(cache=True)
@@ -369,10 +413,15 @@ def turn_on(c, s, p, q):
 
 @numba.njit(cache=True)
 def multiply_rows(waves, strength, out):
-    """Write real parts times the strength (BLOCK,) of their scatterer, and imaginary ones times minus that."""
-    for k in range(BLOCK):
-        factor = strength[k]
-        for n in range(waves.shape[1]):
-            out[k, n] = factor * waves[k, n]
-        for n in range(waves.shape[1]):
-            out[BLOCK + k, n] = -factor * waves[BLOCK + k, n]
+    """Write real parts times the strength (BLOCK,) of their scatterer, and imaginary ones times minus that.
+
+    Both of shape (2, ways, BLOCK, width); the two ways change places.
+    """
+    for way in range(waves.shape[1]):
+        other = waves.shape[1] - 1 - way
+        for k in range(BLOCK):
+            factor = strength[k]
+            for n in range(waves.shape[3]):
+                out[0, other, k, n] = factor * waves[0, way, k, n]
+            for n in range(waves.shape[3]):
+                out[1, other, k, n] = -factor * waves[1, way, k, n]

@@ -78,6 +78,9 @@ class FullMatrix:
     elevation : bool
         Whether the lens is there; without it, elements are infinitely tall; positions remain three-dimensional. The
         error against the exact sum is :data:`PLANE_ACCURACY` without the lens, and 1 % with it.
+    harmonic : bool
+        Whether echoes are those of the second harmonic of a wave that is sent at half of the frequency, which has the
+        square of that wave's beam in elevation. Of each pair of elements it is the mean of both ways.
 
     Attributes
     ----------
@@ -109,7 +112,9 @@ class FullMatrix:
 
     _rib: Rib | None = None
 
-    def __init__(self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True) -> None:
+    def __init__(
+        self, probe: Probe, depth: float, max_delay: float = 0.0, elevation: bool = True, harmonic: bool = False
+    ) -> None:
         centre, speed = probe.frequency_MHz * MHz, probe.sound_speed_m_per_s
         self._width = probe.width_um * um * centre / speed
         self._scheme = (LENS if self._width <= MAX_NARROW_WIDTH else WIDE) if elevation else PLANE
@@ -129,9 +134,9 @@ class FullMatrix:
         self._scales = self.sampling / speed, loss, centre / speed
         self._directivity = directivity.directivity_table(self._width)
         self._set_filters(probe, band.grid)
-        self._lens = _lens(probe, self.max_range) if elevation else None
+        self._lens = _lens(probe, self.max_range, harmonic) if elevation else None
         if self._lens:
-            self._sum = FrequencySum(probe, self.sampling, self.samples)
+            self._sum = FrequencySum(probe, self.sampling, self.samples, harmonic)
         self._clusters = Clusters(self.centres, speed, band, self.max_range, CLUSTER_TOLERANCE[elevation])
         self._tabulate(band, band.frequency / centre)
 
@@ -160,7 +165,12 @@ class FullMatrix:
         if self._lens:
             responses = (stack_real_imaginary(each) for each in (self._lens.beam, self._lens.derivative_residual))
             maps = tuple(_maps(band, degree, phases) for degree in (2, 1))
-            self._lookup = tuple(responses), np.ascontiguousarray(pair_spectra[:, :3], np.float32), maps
+            self._lookup = (
+                tuple(responses),
+                self._lens.power == 1,
+                np.ascontiguousarray(pair_spectra[:, :3], np.float32),
+                maps,
+            )
             return
         spectra = stack_real_imaginary(pair_spectra + 0j)
         terms = [
@@ -360,9 +370,9 @@ def _damping(probe: Probe, frequency: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=1)
-def _lens(probe: Probe, max_range: float) -> Lens:
+def _lens(probe: Probe, max_range: float, harmonic: bool) -> Lens:
     """Lens of a probe, kept for the next matrix of the same: its tables take most of the time to set one up."""
-    return Lens(probe, max_range, _band(probe, True))
+    return Lens(probe, max_range, _band(probe, True), harmonic)
 
 
 def _band(probe: Probe, elevation: bool) -> Band:

@@ -26,8 +26,9 @@ def lens_kernels(index, angle, lookup, terms, entries, order, tables, part):
     angle
         Angle from the centre of the array of each scatterer, as an index, shape (scatterers,).
     lookup
-        Response E of an element and the residual of its derivative, two of shape (curvatures, slopes, 2 nodes),
-        float32: real parts before imaginary ones. Pair spectra for all angles, (ANGLES, 3, nodes), float32. Maps from
+        Response E of an element and the residual of its derivative, or those of a pair, two of shape (curvatures,
+        slopes, 2 nodes), float32: real parts before imaginary ones. Whether they are those of a pair. Pair spectra for
+        all angles, (ANGLES, 3, nodes), float32. Maps from
         spectra to polynomials of second and of first degree, float32, shape (blocks, 2 nodes, phases 3 TAPS) and
         (blocks, 2 nodes, phases 2 TAPS).
     terms
@@ -42,7 +43,7 @@ def lens_kernels(index, angle, lookup, terms, entries, order, tables, part):
     part
         First of the groups of HEIGHT entries in this order that are to be made, and the one after the last.
     """
-    responses, pair_spectra, maps = lookup
+    responses, paired, pair_spectra, maps = lookup
     nodes, width = pair_spectra.shape[2], tables.shape[1] * TAPS
     spectra, factors = np.empty((HEIGHT, 2, 2 * nodes), np.float32), np.zeros((2 * nodes, HEIGHT), np.float32)
     quadratic_rows, linear_rows = np.empty((HEIGHT, 3 * width), np.float32), np.empty((HEIGHT, 2 * width), np.float32)
@@ -54,7 +55,7 @@ def lens_kernels(index, angle, lookup, terms, entries, order, tables, part):
             members += 1
         # Entry by entry: taking a row apart compiles for longer.
         for n in range(members):
-            lens_spectra(responses, index[entries[order[first + n], 0]], looked_up, spectra[n])
+            lens_spectra(responses, paired, index[entries[order[first + n], 0]], looked_up, spectra[n])
         row = 0
         for term in range(len(terms)):
             count, spectrum, pair = terms[term, 1], terms[term, 2], terms[term, 3]
@@ -88,15 +89,17 @@ def write_rows(table, row, count, coefficients):
 
 
 @numba.njit(cache=True)
-def lens_spectra(responses, index, looked_up, spectra):
+def lens_spectra(responses, paired, index, looked_up, spectra):
     """Write E^2, and E' E, which is multiplied by the sum of the inverse-range offsets of two elements: (2, 2 nodes).
 
     E' is the residual of the derivative; both are looked up at a fractional index, and written to `looked_up`, of the
-    same shape.
+    same shape. What stands for E^2 and E' E in a harmonic is looked up itself.
     """
-    response, slope = looked_up[0], looked_up[1]
+    response, slope = (spectra[0], spectra[1]) if paired else (looked_up[0], looked_up[1])
     interpolate(responses[0], index, response)
     interpolate(responses[1], index, slope)
+    if paired:
+        return
     nodes = len(response) // 2
     for n in range(nodes):
         m = nodes + n
