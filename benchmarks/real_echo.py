@@ -22,8 +22,8 @@ from typing import Any
 import cv2
 import numpy as np
 import xarray as xr
+from apical_clip import CYCLE, FRAME_ED, HERE, PIXEL_MM, VIEW, drawn_wall, real_clip, real_scan
 from numpy.typing import NDArray
-from realism import CYCLE, FRAME_ED, HERE, PIXEL_MM, VIEW, drawn_wall, real_clip, real_scan
 from report import table
 from scipy.spatial import cKDTree
 

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+import apical_clip
 import numpy as np
 import realism
 from matplotlib.figure import Figure
@@ -78,11 +79,11 @@ def real() -> Pair:
     """The real clip, without the text beside its sector."""
     from pydicom import examples
 
-    frames = realism.real_clip(Path(examples.get_path("ybr_color")))[list(REAL_FRAMES)]
+    frames = apical_clip.real_clip(Path(examples.get_path("ybr_color")))[list(REAL_FRAMES)]
     (top, middle), (rows, columns) = REAL_TIP, frames.shape[1:]
     row, column = np.indices((rows, columns))
     reach, angle = np.hypot(row - top, column - middle), np.degrees(np.arctan2(column - middle, row - top))
-    _, _, half, _, last = realism.SECTOR
+    _, _, half, _, last = apical_clip.SECTOR
     frames = np.where((np.abs(angle) < half) & (reach < last / 2), frames, 0).astype(np.uint8)
     left, upper = (-REAL_MM * edge for edge in (middle, top))
     return Pair(frames, (left, left + REAL_MM * columns, upper + REAL_MM * rows, upper))

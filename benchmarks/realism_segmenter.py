@@ -23,8 +23,9 @@ import cv2
 import numpy as np
 import pandas as pd
 import torch
+from apical_clip import HERE, drawn_wall, real_clip, real_scan
 from numpy.typing import NDArray
-from realism import BLACK, HERE, drawn_wall, real_clip, real_scan
+from realism import BLACK
 from realism_clips import HEARTS, IMAGED, LABELS, RANGE_DB, SHOWN, Frame, clips
 from report import table
 

@@ -127,7 +127,7 @@ def imaged(case: Case, moving: Heart, plane: Plane, view: str) -> dict[int, np.n
     sequence = Sequence(config, moving, plane, random)
     scatterers = as_stored(case, {"phantom": sequence.scatterers()})["phantom"]
     lines, range_ = sixteen_bit(sequence.lines(scatterers)), sequence.scanner.range
-    gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
+    gain = clip_gain(config.probe, config.bmode, lines.shape[:2], range_, random("dropout"))
     return bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain, config.views[view].motion.is_closed)
 
 

@@ -1,5 +1,6 @@
 """Section `realism`: off by default, invalid combinations are refused, and power does not depend on density."""
 
+import numpy as np
 import pytest
 
 from echotruth.cases import expand
@@ -81,6 +82,25 @@ def test_cases_change_the_preset_of_realism():
     realisms = [case.config.realism for case in expand(configure(cases=keys))]
     assert [each.blood.level_dB for each in realisms] == [None] * 2 + [Realism(preset="mouse").blood.level_dB] * 2
     assert [each.noise.snr_dB for each in realisms] == [None, 20.0] * 2
+
+
+@pytest.mark.parametrize("changes", [{}, {"rf": {"sector_deg": 90.0}}, {"bmode": {"field_of_view_mm": 230.0}}])
+def test_arc_of_a_realistic_sector_just_fits_into_the_image(changes):
+    config = configure("realistic_human", **changes)
+    width = 2 * config.depth_mm * np.sin(np.radians(config.rf.sector_deg / 2))
+    assert width == pytest.approx(config.bmode.field_of_view_mm, rel=1e-4) and width <= config.bmode.field_of_view_mm
+
+
+def test_depth_is_the_side_of_the_image_unless_it_is_given(tmp_path):
+    assert configure().depth_mm == configure().bmode.field_of_view_mm
+    assert configure(rf={"depth_mm": 10.0}).depth_mm == 10
+    file = tmp_path / "deep.yaml"
+    file.write_text("rf: {depth_mm: 13}\n")
+    with pytest.raises(ConfigError, match=r"rf.depth_mm = 13.*must not exceed bmode.field_of_view_mm = 12"):
+        load(file)
+    file.write_text("rf: {depth_mm: 8}\n")
+    with pytest.raises(ConfigError, match=r"rf.focus_mm = 6.5.*must be smaller than 6, .* within rf.depth_mm"):
+        load(file)
 
 
 def test_smoothing_of_realistic_images_follows_their_size():

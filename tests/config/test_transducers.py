@@ -30,7 +30,7 @@ def test_human_array_is_the_p4_2v():
 
 @pytest.mark.parametrize(
     "preset, elements, frequency, length",
-    [("human_3MHz", 80, 3, 20.3e3), ("mouse_linear_40MHz", 256, 40, 14.1e3)],
+    [("human_3MHz", 80, 3, 20.3e3), ("mouse_linear_30MHz", 256, 30, 14.1e3)],
 )
 def test_array_is_as_long_as_its_maker_says(preset, elements, frequency, length):
     probe = Probe(preset=preset)
@@ -39,7 +39,7 @@ def test_array_is_as_long_as_its_maker_says(preset, elements, frequency, length)
 
 
 def test_lines_of_the_linear_array_are_parallel_unless_they_are_told_otherwise():
-    linear = {"probe": {"preset": "mouse_linear_40MHz"}}
+    linear = {"probe": {"preset": "mouse_linear_30MHz"}}
     assert (validate(linear, "a.yaml").rf.scan, validate(linear, "a.yaml").rf.f_number) == ("linear", 2)
     assert validate(linear | {"rf": {"scan": "sector"}}, "a.yaml").rf.scan == "sector"
 
@@ -61,7 +61,7 @@ def test_band_above_the_nyquist_frequency_is_refused(keys):
 
 def test_unknown_array_is_refused_with_those_there_are():
     with pytest.raises(
-        ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'mouse_linear_40MHz'"
+        ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'mouse_linear_30MHz'"
     ):
         validate({"probe": {"preset": "mouse"}}, "a.yaml")
 

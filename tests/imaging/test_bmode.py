@@ -5,18 +5,19 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from echotruth.config import Bmode, Probe
+from echotruth.config.imaging import Dropout
 from echotruth.imaging.beamforming.scan import Linear, Sector
 from echotruth.imaging.bmode import (
     ScanConversion,
     bmode_clip,
     clip_gain,
     downsample,
+    dropout_gain,
     eight_bit,
     enhance_edges,
     envelope,
     envelope_images,
     largest_clip,
-    line_loss,
     log_compress,
     persist,
     pixel_centres,
@@ -148,7 +149,7 @@ def test_by_default_a_scanner_does_nothing_but_compress():
     lines = noise_lines(2)
     images = envelope_images(lines, SECTOR, RANGE, BMODE)
     decibels = 20 * np.log10(np.maximum(images / images.max(), 10 ** (-55 / 20)))
-    gain = clip_gain(Probe(), BMODE, len(ANGLE), RANGE, np.random.default_rng(0))
+    gain = clip_gain(Probe(), BMODE, (2, len(ANGLE)), RANGE, np.random.default_rng(0))
     clip = largest_clip(lines, SECTOR, RANGE, BMODE, gain)
     assert (clip == np.rint(255 * (1 + decibels / 55)).astype(np.uint8)).all()
 
@@ -161,22 +162,40 @@ def test_time_gain_curve_is_linear_in_decibels_between_its_points():
     assert np.allclose(20 * np.log10(gain), [-12, -12, -6, 3, 6], atol=1e-4)
 
 
-def test_lines_drop_out_smoothly_and_in_half_of_the_scan():
-    bmode = Bmode(dropout={"loss_dB": 10, "width": 0.1})
-    losses = np.stack([-20 * np.log10(line_loss(bmode, 193, np.random.default_rng(seed))) for seed in range(400)])
-    assert losses.min() >= 0
-    assert (losses > 1e-6).mean() == pytest.approx(0.5, abs=0.02)
+def losses(dropout, seed, frames=1, lines=193, range_=RANGE):
+    return -20 * np.log10(dropout_gain(Dropout(**dropout), (frames, lines), range_, np.random.default_rng(seed)))
+
+
+def test_echoes_drop_out_smoothly_and_in_half_of_the_scan():
+    found = np.stack([losses({"loss_dB": 10, "width": 0.1}, seed, range_=RANGE[::9]) for seed in range(200)])
+    assert found.min() >= 0
+    assert (found > 1e-6).mean() == pytest.approx(0.5, abs=0.02)
     # The positive part of a normal variable has a mean square of a half.
-    assert np.sqrt((losses**2).mean()) == pytest.approx(10 / np.sqrt(2), rel=0.05)
-    # The slope of a process with this correlation has a deviation of 1 / width.
-    assert np.sqrt(((np.diff(losses) * 192) ** 2).mean()) == pytest.approx(10 / 0.1 / np.sqrt(2), rel=0.05)
+    assert np.sqrt((found**2).mean()) == pytest.approx(10 / np.sqrt(2), rel=0.05)
+    # The slope of a process with this correlation has a deviation of 1 / width, over the scan and over the depth.
+    for axis, step in ((2, 1 / 192), (3, 9 / len(RANGE))):
+        slope = np.diff(found, axis=axis) / step
+        assert np.sqrt((slope**2).mean()) == pytest.approx(10 / 0.1 / np.sqrt(2), rel=0.06)
 
 
-def test_dropout_does_not_depend_on_the_number_of_lines_and_keeps_the_time_gain():
+def test_dropout_comes_and_goes_and_returns_with_the_cycle():
+    found = losses({"loss_dB": 10}, 3, frames=48, lines=33, range_=RANGE[::50])
+    change = np.abs(found - np.roll(found, 1, axis=0)).mean(axis=(1, 2))
+    assert change[0] < 2.5 * change.mean(), "from the last frame to the first as from any to the next"
+    assert np.abs(found[24] - found[0]).mean() > 3 * change.mean()
+
+
+def test_dropout_does_not_depend_on_the_sampling_and_keeps_the_time_gain():
     bmode = Bmode(dropout={"loss_dB": 10}, tgc_dB_per_cm_MHz=0.2)
-    fine, coarse = (clip_gain(Probe(), bmode, lines, RANGE, np.random.default_rng(5)) for lines in (257, 65))
-    assert np.allclose(fine[::4], coarse, rtol=1e-5)
-    assert np.allclose(fine / line_loss(bmode, 257, np.random.default_rng(5))[:, None], fine.max(axis=0), rtol=1e-4)
+    fine, coarse = (clip_gain(Probe(), bmode, shape, RANGE, np.random.default_rng(5)) for shape in ((4, 257), (2, 65)))
+    assert np.allclose(fine[::2, ::4], coarse, rtol=1e-5)
+    assert np.allclose(fine.max(axis=(0, 1)), time_gain_compensation(Probe(), bmode, RANGE), rtol=1e-4)
+
+
+def test_edges_lose_most_at_the_end_and_nothing_at_the_array():
+    found = losses({"edge_loss_dB": 30}, 0, lines=5, range_=np.linspace(0, 10e-3, 11))[0]
+    assert np.allclose(found[0], 30 * np.linspace(0, 1, 11) ** 2, atol=1e-4) and np.allclose(found[0], found[4])
+    assert np.allclose(found[2], 0, atol=1e-5) and np.allclose(found[1], found[0] / 4, atol=1e-4)
 
 
 def test_edges_are_enhanced_within_the_scan_alone():

@@ -27,6 +27,7 @@ FRAMES = 6
 MOTION = {
     "drift": {"lateral_mm": 0.8, "axial_mm": -0.4, "elevation_mm": 0.2},
     "breathing": {"axial_mm": 0.5, "rate_per_min": 150.0, "phase_deg": 60.0},
+    "beat": {"lateral_mm": -0.3, "axial_mm": 0.4, "elevation_mm": -0.1},
     "rocking_deg": 6.0,
 }
 POSE = {"tilt_deg": 8.0, "angle_deg": -15.0, "offset": {"lateral_mm": -0.3, "axial_mm": 0.2}}
@@ -46,9 +47,11 @@ def turn_and_shift(frame):
     A beat takes 0.12 s, in which there is 0.3 of a breath.
     """
     beats = frame / FRAMES
-    turn = np.exp(1j * np.radians(6) * np.sin(np.pi * beats) ** 2)
+    within = np.sin(np.pi * beats) ** 2
+    turn = np.exp(1j * np.radians(6) * within)
     breath = np.sin(np.pi * 0.3 * beats + np.radians(30)) ** 2 - np.sin(np.radians(30)) ** 2
-    return turn, (0.8 + 0.4j) * 1e-3 * beats - 0.5e-3j * breath, 0.2e-3 * beats
+    shift = (0.8 + 0.4j) * 1e-3 * beats - 0.5e-3j * breath - (0.3 + 0.4j) * 1e-3 * within
+    return turn, shift, 0.2e-3 * beats - 0.1e-3 * within
 
 
 @pytest.fixture(scope="module")

@@ -132,7 +132,7 @@ def test_image_of_a_point_appears_where_the_pose_of_the_probe_puts_it():
     ("motion", "is_closed"),
     [
         ({}, True),
-        ({"rocking_deg": 5.0}, True),
+        ({"rocking_deg": 5.0, "beat": {"lateral_mm": 1.0}}, True),
         ({"drift": {"elevation_mm": 0.1}}, False),
         ({"breathing": {"axial_mm": 0.1}}, False),
         ({"breathing": {"phase_deg": 90.0}}, True),
@@ -143,7 +143,12 @@ def test_drift_and_breathing_keep_the_cycle_from_closing(motion, is_closed):
 
 
 @pytest.mark.parametrize(
-    "view", [{"offset": {"axial_mm": 5.0}}, {"offset": {"axial_mm": 2.0}, "motion": {"drift": {"axial_mm": -3.0}}}]
+    "view",
+    [
+        {"offset": {"axial_mm": 5.0}},
+        {"offset": {"axial_mm": 2.0}, "motion": {"drift": {"axial_mm": -3.0}}},
+        {"offset": {"axial_mm": 2.0}, "motion": {"beat": {"axial_mm": -3.0}}},
+    ],
 )
 def test_probe_that_would_come_into_the_heart_is_refused(view):
     with pytest.raises(ConfigError, match=r"views\.mid\.offset\.axial_mm .*brings the array into the heart"):

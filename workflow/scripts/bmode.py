@@ -7,7 +7,7 @@ from echotruth.workflow.job import Job, Result, main
 
 def work(job: Job) -> Result:
     config, lines, range_ = job.config, job.read("rf", "lines")["lines"], job.coordinate("rf", "range")
-    gain = clip_gain(config.probe, config.bmode, lines.shape[1], range_, job.random_of("dropout"))
+    gain = clip_gain(config.probe, config.bmode, lines.shape[:2], range_, job.random_of("dropout"))
     scan, is_closed = scan_lines(config.probe, config.rf), job.view.motion.is_closed
     clips = bmode_clip(lines, scan, range_, config.bmode, gain, is_closed)
     return {f"bmode/{size}": {"image": clip} for size, clip in clips.items()}

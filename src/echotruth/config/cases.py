@@ -80,6 +80,8 @@ class Distribution(Section):
 POSES: dict[str, list[float]] = PRESETS["poses"]
 """Bounds of keys of every view that `cases.draw.preset: acoustics` draws uniformly, beside their value in the
 configuration; lengths over `rf.focus_mm`."""
+LEVELS: dict[str, list[float]] = PRESETS["levels"]
+"""Bounds of keys that it draws so beside them, dB."""
 DRAW_PRESETS: dict[str, dict[str, dict[str, Any]]] = PRESETS["draws"]
 """`cases.draw.preset` -> distributions of dotted keys."""
 HEARTS = DRAW_PRESETS["hearts"]

@@ -2,15 +2,17 @@
 scan from the array, lengths of trackers from the field of view.
 """
 
-from math import isfinite
+from math import floor, isfinite, sin
 from typing import Any, NamedTuple
 
-from echotruth.config.cases import POSES, presets_of
+from echotruth.config.cases import LEVELS, POSES, presets_of
 from echotruth.config.imaging import VIEWS
 from echotruth.config.merging import merged, nested
 from echotruth.config.presets import PRESETS
+from echotruth.config.realism import REALISM_PRESETS
 from echotruth.config.tracking import METHODS, PhaseCorrelation, default_trackers, name_of
 from echotruth.config.transducers import ARRAY_DEFAULTS, ARRAY_PRESETS
+from echotruth.units import deg
 
 HEART_DEFAULTS: dict[str, dict[str, Any]] = PRESETS["heart"]
 """`geometry.preset` -> default of dotted keys."""
@@ -22,16 +24,16 @@ REALISM_SMOOTHING = 1 / 260
 """Default of `bmode.smoothing_width_px` over the side of the image, with any `realism.preset`."""
 REALISM_IMAGE: dict[str, Any] = PRESETS["realistic_image"]
 """Defaults of dotted keys with any `realism.preset`."""
-REALISM_EDGE_LOSS_DB, REALISM_EDGE_DEG = 22.0, 85.0
-"""Default of `bmode.dropout.edge_loss_dB` of a sector, with any `realism.preset`, and the opening angle of that sector;
-of others it is that of lines at the same angle."""
+REALISM_EDGE_LOSS_DB, REALISM_EDGE_DEG, REALISM_EDGE_DEPTH = 22.0, 85.0, 0.8
+"""Default of `bmode.dropout.edge_loss_dB` of a sector, with any `realism.preset`, and the opening angle and the depth,
+over the default field of view of the array, of that sector; others lose as much at the same angle and range."""
 
 
 class Look(NamedTuple):
     """Defaults of realistic images of a species that differ from those of another, as presets.yaml explains them."""
 
     bandwidth: float
-    gain_dB: float
+    image: dict[str, Any]
     time_gain_dB: dict[float, float]
     harmonic: float | None
     scan: dict[str, tuple[float, float]]
@@ -74,7 +76,7 @@ def apply_presets(values: dict[str, Any]) -> dict[str, Any]:
     path = _value(values, "motion.file.path")
     if _value(values, "motion.kind") == "file" and isinstance(path, str) and not path.lower().endswith(ARRAY_SUFFIXES):
         values = _filled(values, {"geometry.file": path})
-    return _with_poses(_with_lengths(values))
+    return _with_acoustics(_with_lengths(values))
 
 
 def _filled(values: dict[str, Any], defaults: dict[str, Any]) -> dict[str, Any]:
@@ -101,7 +103,7 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
         return {}
     width = REALISM_SMOOTHING * size if isinstance(size, int | float) else 2.0
     found = REALISM_IMAGE | {"bmode.smoothing_width_px": round(max(width, 0.5), 3)} | _harmonic(values, array, look)
-    found |= {"bmode.gain_dB": look.gain_dB} | _scan(array, look)
+    found |= {f"bmode.{key}": value for key, value in look.image.items()} | _scan(values, array, look)
     if any(_value(values, f"bmode.time_gain.{key}") for key in ("range_mm", "gain_dB")):
         found = {key: value for key, value in found.items() if not key.startswith("bmode.time_gain")}
     if array not in ARRAY_PRESETS or _value(values, "probe.bandwidth") is not None:
@@ -114,15 +116,20 @@ def _scanner(values: dict[str, Any], array: str) -> dict[str, Any]:
     return found | {"probe.bandwidth": round(look.bandwidth * ARRAY_PRESETS[array]["bandwidth"], 3), density: number}
 
 
-def _scan(array: str, look: Look) -> dict[str, Any]:
-    """Defaults of dotted keys of a scan that shows what a preset has, and of its gain over range."""
+def _scan(values: dict[str, Any], array: str, look: Look) -> dict[str, Any]:
+    """Defaults of dotted keys of a scan that shows what a preset has, of its gain over range, and of its edges."""
     if array not in ARRAY_DEFAULTS:
         return {}
     default, gain = ARRAY_DEFAULTS[array], look.time_gain_dB
     scan = {key: round(value / usual * default[key], 3) for key, (value, usual) in look.scan.items()}
-    if default.get("rf.scan") != "linear":
-        sector = scan.get("rf.sector_deg", default["rf.sector_deg"])
-        scan["bmode.dropout.edge_loss_dB"] = round(REALISM_EDGE_LOSS_DB * (sector / REALISM_EDGE_DEG) ** 2, 1)
+    given = {key: _value(values, key) for key in ("rf.scan", "rf.sector_deg", "bmode.field_of_view_mm")}
+    used = default | scan | {key: value for key, value in given.items() if value is not None}
+    sector, side = used["rf.sector_deg"], used["bmode.field_of_view_mm"]
+    if used.get("rf.scan") != "linear" and _is_finite(sector) and 5 < sector <= 120 and _is_finite(side):
+        # The arc just fits into the image.
+        depth = floor(1e3 * side * min(1, 0.5 / sin(sector / 2 * deg))) / 1e3
+        edge = sector / REALISM_EDGE_DEG * depth / (REALISM_EDGE_DEPTH * default["bmode.field_of_view_mm"])
+        scan |= {"rf.depth_mm": depth, "bmode.dropout.edge_loss_dB": round(min(REALISM_EDGE_LOSS_DB * edge**2, 60), 1)}
     ranges = [round(share * default["bmode.field_of_view_mm"], 3) for share in gain]
     return scan | {
         "bmode.time_gain.range_mm": ranges,
@@ -156,8 +163,11 @@ def _with_lengths(values: dict[str, Any]) -> dict[str, Any]:
     return values | {"tracking": tracking | {"trackers": scaled}}
 
 
-def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
-    """Values with the distributions of the poses of all views, if a preset draws them and views and focus are valid."""
+def _with_acoustics(values: dict[str, Any]) -> dict[str, Any]:
+    """Values with the distributions of levels and of the poses of all views, about their own values.
+
+    They are added if a preset draws them, and views and focus are valid.
+    """
     draw, given, focus = (_value(values, key) for key in ("cases.draw", "views", "rf.focus_mm"))
     views = VIEWS["paper"] if given is None else given
     if isinstance(views, dict) and isinstance(preset := views.get("preset"), str):
@@ -165,8 +175,19 @@ def _with_poses(values: dict[str, Any]) -> dict[str, Any]:
     valid = isinstance(draw, dict) and isinstance(draw.get("keys", {}), dict) and isinstance(views, dict)
     if not valid or "acoustics" not in presets_of(draw) or not _is_finite(focus):
         return values
-    keys = _poses(views, focus) | draw.get("keys", {})
+    keys = _levels(values) | _poses(views, focus) | draw.get("keys", {})
     return values | {"cases": values["cases"] | {"draw": draw | {"keys": keys}}}
+
+
+def _levels(values: dict[str, Any]) -> dict[str, Any]:
+    """Distributions of levels, about those of the configuration or of its `realism.preset`."""
+    preset, found = REALISM_PRESETS.get(str(_value(values, "realism.preset")), {}), {}
+    for key, bounds in LEVELS.items():
+        value = _value(values, key)
+        value = _value({"realism": preset}, key) if value is None else value
+        if _is_finite(value):
+            found[key] = {"uniform": [value + bound for bound in bounds]}
+    return found
 
 
 def _poses(views: dict[str, Any], focus_mm: float) -> dict[str, Any]:

@@ -50,6 +50,9 @@ class ViewMotion(Section):
     Either may move. The truth is that of the image: displacement has this motion, strain has not.
     """
 
+    beat: Excursion = Excursion()
+    """Excursion from end-diastole to the middle of the beat and back, a raised cosine, as of a heart whose apex knocks
+    against the chest."""
     drift: Excursion = Excursion()
     """Displacement in the course of one beat, at a constant rate, as of a hand that slips."""
     breathing: Breathing = Breathing()
@@ -92,7 +95,8 @@ class View(Section):
     def approach_mm(self) -> float:
         """Upper bound of how much nearer to the heart the probe comes than with offset 0 at end-diastole, mm."""
         motion = self.motion
-        return self.offset.axial_mm + max(-motion.drift.axial_mm, 0.0) + abs(motion.breathing.axial_mm)
+        towards = (max(-each.axial_mm, 0.0) for each in (motion.beat, motion.drift))
+        return self.offset.axial_mm + sum(towards) + abs(motion.breathing.axial_mm)
 
 
 ALL_VIEWS = "all"
@@ -129,6 +133,9 @@ class Rf(Section):
 
     focus_mm: Positive = 6.5
     """Transmit focus, at which the heart lies. Default: from `probe.preset`."""
+    depth_mm: Positive | None = None
+    """Greatest range. Default: `bmode.field_of_view_mm`, which cuts a wide sector at the sides of the image, but with a
+    `realism.preset` the range at which the arc of the sector just fits into the image."""
     focal_zones: Annotated[int, Field(ge=1, le=16)] = 5
     """Focused: focal zones, each with one transmit per line. Their foci are centred on `focus_mm`; between two foci, a
     line blends from the echoes of one to those of the other. With 1, there is one focus, and outside its depth of field
@@ -138,7 +145,7 @@ class Rf(Section):
     `probe.preset`."""
     scan: Literal["sector", "linear"] = "sector"
     """`sector`: lines from the centre of the array at equal angles. `linear`: parallel lines perpendicular to the
-    array. Default: `linear` for `mouse_linear_40MHz`."""
+    array. Default: `linear` for `mouse_linear_30MHz`."""
     lines: Annotated[int, Field(ge=16, le=2048)] = 192
     """Scan lines. With the default there are five per beam width, and interpolation between them loses less than 1 % of
     the envelope."""
@@ -168,7 +175,7 @@ class Rf(Section):
     the frequency stays, so give that too."""
     f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
     """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range. Default: 2 for
-    `mouse_linear_40MHz`."""
+    `mouse_linear_30MHz`."""
     elevation_beam: bool = True
     """Include scatterers off the imaging plane, with the lens's elevation beam; `false` makes the elements infinitely
     tall. The error of the RF against the exact sum (relative, L2) is 1.5 % beyond one aperture, or beyond two with the
@@ -224,25 +231,24 @@ class TimeGain(Section):
 
 
 class Dropout(Section):
-    """Loss of scan lines over the whole range, as of poor contact or lung beside the window of the probe."""
+    """Loss of echoes that comes and goes, as of poor contact or lung beside the window of the probe."""
 
     loss_dB: Annotated[FiniteFloat, Field(ge=0, le=60)] = 0.0
-    """Size of the loss: that of a line is this times the positive part of a smooth random function of unit variance,
-    the same in all frames of a view; half of the lines have none. 0 for no loss."""
+    """Size of the loss: it is this times the positive part of a smooth random function of unit variance over lines,
+    range and time, which returns with the cycle; half of the echoes lose nothing. 0 for no loss."""
     edge_loss_dB: Annotated[FiniteFloat, Field(ge=0, le=60)] = 0.0
-    """Further loss of the outermost lines, where beams are steered most; towards the middle it falls to 0 as the square
-    of the distance from it."""
+    """Further loss of the outermost lines at the greatest range, where beams are steered most; towards the middle and
+    towards the array it falls to 0 as the squares of the distances from them."""
     width: Annotated[FiniteFloat, Field(ge=0.02, le=1)] = 0.1
-    """Distance over which the first loss changes, as a fraction of the scan: standard deviation of its Gaussian
-    correlation."""
+    """Distance over which the first loss changes, as a fraction of the scan and of the depth: standard deviation of its
+    Gaussian correlation."""
 
 
 class Bmode(Section):
     """Conversion of RF to 8-bit images: gain, log compression, and what a scanner does to images after it."""
 
     field_of_view_mm: Annotated[FiniteFloat, Field(gt=0, le=1000)] = 12.0
-    """Side of the square image, and greatest range; the array is in the middle of its upper edge. Default: from
-    `probe.preset`."""
+    """Side of the square image; the array is in the middle of its upper edge. Default: from `probe.preset`."""
     size_px: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pixels along a side of the full image."""
     downsampling: Annotated[tuple[Divisor, ...], Field(min_length=1), BeforeValidator(_as_tuple)] = (1, 2, 4)
@@ -255,7 +261,7 @@ class Bmode(Section):
     time_gain: TimeGain = TimeGain()
     """Curve of gain over range, as the sliders of a scanner set it, on top of `bmode.tgc_dB_per_cm_MHz`."""
     dropout: Dropout = Dropout()
-    """Loss of scan lines over the whole range, as of poor contact or lung beside the window of the probe."""
+    """Loss of echoes that comes and goes, as of poor contact or lung beside the window of the probe."""
     gain_dB: Gain = 0.0
     """Gain of the compressed images: at 0 the brightest echo of the clip is just white. Above, all echoes down to this
     far below it are white; below, as much is lost at the dark end."""

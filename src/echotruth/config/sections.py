@@ -57,6 +57,11 @@ class Config(Section):
     """The hearts: values of dotted keys such as `fibres.endo_deg: [60, 70]`, of which all combinations are made, a
     table, random draws, and conditions; they multiply, 100 000 hearts at most (docs/cases.md)."""
 
+    @property
+    def depth_mm(self) -> float:
+        """Greatest range of the lines, mm."""
+        return self.bmode.field_of_view_mm if self.rf.depth_mm is None else self.rf.depth_mm
+
     @check
     def _is_no_store(self) -> None:
         remedy = f"must not end in .zarr, as the store does, which is out/NAME/NAME.zarr: write {self.name[:-5]}"
@@ -74,10 +79,12 @@ class Config(Section):
             self._check_tracker(f"tracking.trackers.{name}", tracker)
         remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
         self.require(tracking.frame_step < self.loop.frames, "tracking.frame_step", remedy)
-        self.require(rf.focus_mm < side, "rf.focus_mm", f"must be smaller than bmode.field_of_view_mm = {side:g}")
+        depth, key = self.depth_mm, "bmode.field_of_view_mm" if rf.depth_mm is None else "rf.depth_mm"
+        self.require(depth <= side, "rf.depth_mm", f"must not exceed bmode.field_of_view_mm = {side:g}")
+        self.require(rf.focus_mm < depth, "rf.focus_mm", f"must be smaller than {key} = {depth:g}")
         foci = f"its focal_zones = {rf.focal_zones} foci, focal_spacing_mm = {rf.focal_spacing_mm:g} apart"
-        remedy = f"must be smaller than {side - rf.focal_half_span_mm:g}, so that {foci}, lie in the field of view"
-        self.require(rf.focus_mm + rf.focal_half_span_mm < side, "rf.focus_mm", remedy)
+        remedy = f"must be smaller than {depth - rf.focal_half_span_mm:g}, so that {foci}, lie within {key}"
+        self.require(rf.focus_mm + rf.focal_half_span_mm < depth, "rf.focus_mm", remedy)
 
     def _check_tracker(self, path: str, tracker: Section) -> None:
         smallest, side = self.bmode.sizes[-1], self.bmode.field_of_view_mm

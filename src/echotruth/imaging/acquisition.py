@@ -51,7 +51,7 @@ class Acquisition:
         self._growth_range = config.rf.focus_mm * mm if config.rf.harmonic else 0.0
         self._screen = _screen(config, scanner.matrix.frequency, random) if realism.aberration.delay_ns else ()
         if realism.haze.level_dB is not None:
-            echoes = reverberation(realism.haze, config.probe, config.bmode.field_of_view_mm * mm, random("haze"))
+            echoes = reverberation(realism.haze, config.probe, config.depth_mm * mm, random("haze"))
             self._haze_range = realism.haze.max_source_range_mm * mm
             self._filter = 1 + reverberation_filter(echoes, config.probe, scanner.matrix.frequency)
         if realism.shadow.side != "none":

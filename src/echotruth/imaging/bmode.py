@@ -8,11 +8,12 @@ images comes last, before they are rounded to eight bits: persistence, smoothing
 import numpy as np
 
 from echotruth.config import Bmode, Probe
+from echotruth.config.imaging import Dropout
 from echotruth.imaging.beamforming.scan import Scan
 from echotruth.units import MHz, dB_per_cm_MHz, mm
 
 DROPOUT_WAVES = 64
-"""Waves of which the random function of :func:`line_loss` is the sum."""
+"""Waves of which the random function of :func:`dropout_gain` is the sum."""
 
 
 def time_gain_compensation(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np.ndarray:
@@ -35,49 +36,69 @@ def time_gain_compensation(probe: Probe, bmode: Bmode, range_: np.ndarray) -> np
         return gain.astype(np.float32)
 
 
-def line_loss(bmode: Bmode, lines: int, random: np.random.Generator) -> np.ndarray:
-    """Gain of every scan line, at most 1, shape (lines,), 1, float32; see `bmode.dropout`.
+def dropout_gain(
+    dropout: Dropout, shape: tuple[int, int], range_: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
+    """Gain of the echoes, at most 1, shape (frames, lines, ranges), 1, float32; see `bmode.dropout`.
 
-    The loss in dB is the positive part of a random function of the place of the line in the scan: a sum of cosines of
-    random phase, whose wave numbers are normally distributed, so that its correlation is Gaussian (Rahimi & Recht 2007,
-    Random features for large-scale kernel machines). The number of lines does not change it.
+    The first loss in dB is the positive part of a random function of line, range and time: a sum of cosines of random
+    phase, whose wave numbers are normally distributed, so that its correlation is Gaussian (Rahimi & Recht 2007, Random
+    features for large-scale kernel machines). In time they are whole, so that it returns with the cycle. Numbers of
+    lines, ranges and frames do not change it.
+
+    Parameters
+    ----------
+    dropout
+    shape
+        Numbers of frames, of an even cycle, and of lines.
+    range_
+        Shape (ranges,), m, up to the depth.
+    random
     """
-    wave_number = random.standard_normal(DROPOUT_WAVES) / bmode.dropout.width
+    over_scan, over_depth = np.linspace(-1, 1, shape[1]), range_ / range_[-1]
+    wave_number = random.standard_normal((2, DROPOUT_WAVES)) / dropout.width
+    over_time = 2 * np.pi * np.rint(random.standard_normal(DROPOUT_WAVES))
     phase = random.uniform(0, 2 * np.pi, DROPOUT_WAVES)
-    waves = np.cos(np.linspace(0, 1, lines)[:, None] * wave_number + phase)
-    loss = bmode.dropout.loss_dB * np.maximum(np.sqrt(2 / DROPOUT_WAVES) * waves.sum(axis=1), 0)
-    loss += bmode.dropout.edge_loss_dB * np.linspace(-1, 1, lines) ** 2
-    return (10 ** (-loss / 20)).astype(np.float32)
+    lines = np.exp(1j * (np.outer(over_scan / 2, wave_number[0]) + phase))
+    waves = np.exp(1j * np.outer(wave_number[1], over_depth)) * np.sqrt(2 / DROPOUT_WAVES)
+    edge = dropout.edge_loss_dB * np.outer(over_scan**2, over_depth**2)
+    gain = np.empty((*shape, len(range_)), np.float32)
+    for frame in range(shape[0]):
+        moved = lines * np.exp(1j * over_time * frame / shape[0])
+        loss = dropout.loss_dB * np.maximum((moved @ waves).real, 0) + edge
+        gain[frame] = 10 ** (-loss / 20)
+    return gain
 
 
-def clip_gain(probe: Probe, bmode: Bmode, lines: int, range_: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def clip_gain(
+    probe: Probe, bmode: Bmode, shape: tuple[int, int], range_: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
     """Gain of the envelope before it is compressed.
 
     Parameters
     ----------
     probe, bmode
         As of :func:`time_gain_compensation`.
-    lines
-        Number of scan lines.
+    shape
+        Numbers of frames, of an even cycle, and of lines.
     range_
         Shape (ranges,), m.
     random
-        For :func:`line_loss`.
+        For :func:`dropout_gain`.
 
     Returns
     -------
-    Shape (ranges,), or (lines, ranges) if scan lines drop out, 1, float32.
+    Shape (frames, lines, ranges), or (1, ranges) if no echoes drop out, 1, float32.
     """
-    gain = time_gain_compensation(probe, bmode, range_)
-    dropout = bmode.dropout
+    gain, dropout = time_gain_compensation(probe, bmode, range_), bmode.dropout
     drops = dropout.loss_dB or dropout.edge_loss_dB
-    return line_loss(bmode, lines, random)[:, None] * gain if drops else gain
+    return gain * dropout_gain(dropout, shape, range_, random) if drops else gain[None]
 
 
 def envelope(lines: np.ndarray, gain: np.ndarray | float = 1.0) -> np.ndarray:
     """Envelope, float32, of demodulated or analytic lines (..., lines, ranges), complex64, times a gain.
 
-    The gain is that of :func:`clip_gain`, (ranges,) or (lines, ranges).
+    The gain is a frame of that of :func:`clip_gain`, of a shape that broadcasts to (lines, ranges).
     """
     return np.abs(lines) * np.asarray(gain, np.float32)
 
@@ -282,14 +303,15 @@ def envelope_images(lines: np.ndarray, scan: Scan, range_: np.ndarray, bmode: Bm
     bmode
         Field of view and size of the image.
     gain
-        Shape (ranges,) or (lines, ranges), 1; see :func:`clip_gain`.
+        Of :func:`clip_gain`, 1; of any shape that broadcasts to that of the lines.
 
     Returns
     -------
     Shape (frames, axial, lateral), float32; 0 outside the scan.
     """
     convert = ScanConversion(scan, range_, bmode)
-    return np.stack([convert(envelope(frame, gain)) for frame in lines])
+    gains = np.broadcast_to(np.asarray(gain, np.float32), lines.shape)
+    return np.stack([convert(envelope(*each)) for each in zip(lines, gains, strict=True)])
 
 
 def bmode_clip(

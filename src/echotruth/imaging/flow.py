@@ -74,7 +74,7 @@ def slice_thickness(config: Config, range_: Floats) -> Floats:
     """
     if config.phantom.in_plane_only or not config.rf.elevation_beam:
         return np.full(np.shape(range_), np.inf)
-    return np.interp(range_, *_table(config.probe, config.bmode.field_of_view_mm * mm, config.rf.harmonic))
+    return np.interp(range_, *_table(config.probe, config.depth_mm * mm, config.rf.harmonic))
 
 
 @lru_cache(maxsize=64)

@@ -40,7 +40,7 @@ class Sequence:
 
     def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random, time: Floats | None = None) -> None:
         self._scene = Scene(config, heart, plane, random, frame_times(config.loop) if time is None else time)
-        self._array = config.probe, config.rf, config.bmode.field_of_view_mm * mm
+        self._array = config.probe, config.rf, config.depth_mm * mm
 
     @cached_property
     def scanner(self) -> Scanner:

@@ -147,8 +147,9 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop, time: Floa
         return heart
     beat = period(loop)
     time = frame_times(loop)[: len(heart.displacement)] if time is None else time
-    angle = motion.rocking_deg * deg * raised_cosine(2 * np.pi * time / beat)
-    shift = np.outer(time / beat, _vector(motion.drift))
+    within = raised_cosine(2 * np.pi * time / beat)
+    angle = motion.rocking_deg * deg * within
+    shift = np.outer(within, _vector(motion.beat)) + np.outer(time / beat, _vector(motion.drift))
     shift += np.outer(inspiration(motion.breathing, time, beat), _vector(motion.breathing))
     rotation = [plane.axes.T @ rotation_in_image(each) @ plane.axes for each in angle]
     rigid = RigidMotion(plane.origin, np.stack(rotation), shift @ plane.axes)

@@ -167,7 +167,7 @@ def image(
     sequence = Sequence(config, moving, plane, random)
     with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range
-    gain = clip_gain(config.probe, config.bmode, config.rf.lines, range_, random("dropout"))
+    gain = clip_gain(config.probe, config.bmode, lines.shape[:2], range_, random("dropout"))
     pixels = pixel_centres(config.bmode, size)
     tissue = TissueImages(config, moving, plane, *pixels)
     images = bmode_clip(lines, sequence.scanner.scan, range_, config.bmode, gain, is_closed)

@@ -137,7 +137,7 @@ def _prf(config: Config, packet: int, moving: MovingHeart, scan: Scan, given: fl
     """Pulse repetition frequency, Hz: the one given, or the default, once it and the packet are possible."""
     if not isinstance(packet, (int, np.integer)) or packet < 2:
         raise ValueError(f"packet = {packet!r}: give a whole number of pulses, two or more.")
-    p, depth = config.probe, config.bmode.field_of_view_mm * mm
+    p, depth = config.probe, config.depth_mm * mm
     lowest, highest = packet / moving.period, p.sound_speed_m_per_s / (2 * depth)
     if lowest > highest:
         most = f"give at most {floor(highest * moving.period)}, which fit into a cycle at {floor(highest)} Hz"

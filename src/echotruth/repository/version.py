@@ -186,14 +186,13 @@ def _mechanics(config: Config, view: str, tracker: str) -> Settings:
 
 def _phantom(config: Config, view: str, tracker: str) -> Settings:
     """What the scatterers of a view depend on, and their echoes: the group `rf` has no settings of its own."""
-    depth = config.bmode.field_of_view_mm
     levels = config.realism.model_dump(mode="json", exclude={"preset"})
-    return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, levels, depth
+    return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, levels, config.depth_mm
 
 
 def _truth(config: Config, view: str, tracker: str) -> Settings:
     """What the truth of a view depends on."""
-    return (*_image(config), config.views[view], config.rf.focus_mm, *_neighbours(config))
+    return (*_image(config), config.depth_mm, config.views[view], config.rf.focus_mm, *_neighbours(config))
 
 
 def _image(config: Config) -> Settings:
@@ -217,7 +216,7 @@ def _bmode(config: Config, view: str, tracker: str) -> Settings:
 
 def _points(config: Config, view: str, tracker: str) -> Settings:
     """What the true motion of the points depends on."""
-    return (*_image(config), config.views[view], config.rf.focus_mm, config.tracking.grid)
+    return (*_image(config), config.depth_mm, config.views[view], config.rf.focus_mm, config.tracking.grid)
 
 
 def _tracking(config: Config, view: str, tracker: str) -> Settings:

@@ -236,7 +236,7 @@ def outside_heart(heart: Heart, frame: int, position: Floats, *, column: bool = 
 
 def _drawn_evenly(config: Config, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Positions in the image (n, 3), m, and the density there, (n,), 1/m^3."""
-    start, depth = config.realism.surroundings.start_mm * mm, config.bmode.field_of_view_mm * mm
+    start, depth = config.realism.surroundings.start_mm * mm, config.depth_mm * mm
     scan, focus = scan_lines(config.probe, config.rf), config.rf.focus_mm * mm
     if depth <= start:
         return np.empty((0, 3)), np.empty(0)

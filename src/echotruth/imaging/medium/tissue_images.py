@@ -89,7 +89,7 @@ class TissueImages:
         scan = scan_lines(self._config.probe, self._config.rf)
         line, range_ = scan.to_scan_coordinates(self._lateral, self._axial[:, None])
         begins = self._config.realism.surroundings.start_mm * mm
-        beyond = (range_ < begins) | (range_ > self._config.bmode.field_of_view_mm * mm)
+        beyond = (range_ < begins) | (range_ > self._config.depth_mm * mm)
         return (line < 0) | (line > len(scan.angle) - 1) | beyond
 
     @cached_property
