@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +113,7 @@ class Heart:
             arrays=arrays,
         )
 
-    @property
+    @cached_property
     def right_wall(self) -> NDArray[np.bool_]:
         """Cells of the free wall of a right ventricle, (n_cells,): tissue without truth of its own."""
         return in_right_wall(self.wall_depth, self.cells)

@@ -132,7 +132,7 @@ class Pathology(Section):
 
     preset: Literal["hypertension", "dcm"] | None = None
     """Growth and load of a disease, which let the heart beat in a circulation (docs/physiology.md); keys that are given
-    take precedence. `hypertension`: concentric growth - a wall thicker by a fifth, narrow and stiff arteries, and
+    take precedence. `hypertension`: concentric growth - a wall thicker by three tenths, narrow and stiff arteries, and
     contractility kept. `dcm`: dilated cardiomyopathy, eccentric growth - a wider cavity, weak muscle and retained
     fluid."""
     infarct: Infarct = Infarct()
