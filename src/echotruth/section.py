@@ -100,6 +100,11 @@ def value_of(section: Any, dotted_key: str) -> Any:
     return value
 
 
+def as_tuple(value: Any) -> Any:
+    """Convert a list, which YAML has, to the tuple that the strict model requires."""
+    return tuple(value) if isinstance(value, list) else value
+
+
 def variants(annotation: Any) -> dict[str, type[Section]]:
     """Name -> section of the variants in a tagged union (laws of a material) or in a mapping to one (trackers)."""
     if get_origin(annotation) is dict:

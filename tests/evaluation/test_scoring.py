@@ -35,6 +35,9 @@ def ventricle(plane="short_axis"):
     return Truth(inside, wall, operator, fraction * position, out, everywhere, 2, lines, time)
 
 
+LATER = 1.5 * np.array([0, -0.05, -0.1, -0.05, 0])[:, None, None]
+
+
 def rings(fraction):
     """Endocardial, middle and epicardial contour, all of which change by a fraction (frame, 1, 1)."""
     angle = np.linspace(0, 2 * np.pi, 121)
@@ -61,6 +64,21 @@ def test_the_truth_itself_has_no_error(truth):
         if "e_ll_" in name or "gls_" in name or "transmural_gradient" in name:
             continue
         assert value == pytest.approx(perfect, abs=1e-6, nan_ok=True), name
+
+
+def test_peaks_are_those_of_the_first_beat(truth):
+    """Of a clip of two beats the second, which contracts more, is found too late and too weak."""
+    twice = np.concatenate([truth.displacement, 1.5 * truth.displacement])
+    lines = replace(
+        truth.contours, displacement=np.concatenate([truth.contours.displacement, rings(LATER).displacement])
+    )
+    given = {"displacement": twice, "contours": lines, "time": 3e-3 * np.arange(10)}
+    both = replace(truth, strain=np.tile(truth.strain, (1, 2, 1, 1)), through_plane=np.zeros(twice.shape[:2]), **given)
+    found = np.concatenate([truth.displacement, np.roll(truth.displacement, 1, 0)])
+    errors = [score(tracked(each, found), each) for each in (both, replace(both, beat=5))]
+    late, first = (error["time_to_peak_error"] for error in errors)
+    np.testing.assert_allclose(first, 0, atol=1e-9)
+    np.testing.assert_allclose(late, -15e-3, atol=1e-9)
 
 
 @pytest.mark.parametrize("quantum", [0.0, 2.0**-24])

@@ -12,7 +12,7 @@ from echotruth.fem.location import locate
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.anatomy import Anatomy
 from echotruth.imaging.medium.blood import Cavity
-from echotruth.imaging.medium.filling import aortic_opening, emptied, opening, volumes
+from echotruth.imaging.medium.filling import aortic_opening, course, emptied, opening, volumes
 from echotruth.imaging.medium.medium import bodies
 from echotruth.imaging.medium.surroundings import Surroundings, tissues
 from echotruth.units import per_mm3
@@ -170,6 +170,15 @@ def test_the_valve_is_open_while_the_cavity_fills(heart):
 def test_the_mitral_valve_is_shut_while_the_cavity_empties_though_it_fills_a_little_before():
     open_ = opening(np.array([97.0, 100, 100, 85, 65, 50, 50, 60, 75, 85, 92, 97]))
     assert (open_[:6] == 0).all() and open_[7] == 1
+
+
+def test_the_mitral_valve_opens_in_each_of_several_beats(heart):
+    """The second one ejects half as much, so that the smallest volume of all is in the first."""
+    both = np.concatenate([heart.displacement, heart.displacement * 0.5])
+    config = Config.model_validate({"loop": {"frames": 16, "beats": [{}, {"stroke": 0.5}]}})
+    open_ = course(opening, replace(heart, displacement=both, config=config))
+    np.testing.assert_array_equal(open_[:8], opening(volumes(heart)))
+    assert (open_[8:12] == 0).all() and (open_[[12, 13]] == 1).all() and 0 < open_[14] < 1
 
 
 def test_there_are_no_valves_of_chambers_without_chambers():

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.difficulty.floors import difficulty
 from echotruth.cases import expand
 from echotruth.config import Config, Motion, View
+from echotruth.config.building import configure
 from echotruth.config.imaging import Excursion, ViewMotion
 from echotruth.config.motion import Rigid
 from echotruth.evaluation.points import ground_truth, read_truth
@@ -154,6 +155,16 @@ def test_the_column_above_the_lid_tilts_with_a_base_that_tilts(still):
 
 def test_no_motion_leaves_the_heart_as_it_is(still):
     assert before_probe(still, config(FRAMES, {}), "mid")[0] is still
+
+
+def test_probe_rocks_with_every_beat(still):
+    twice = replace(still, displacement=np.concatenate([still.displacement] * 2))
+    rocked = config(2 * len(still.displacement), {"rocking_deg": 6.0})
+    of_two = configure(rocked, loop={"beats": [{}, {}]})
+    moving, _ = before_probe(twice, of_two, "mid")
+    once, _ = before_probe(still, config(len(still.displacement), {"rocking_deg": 6.0}), "mid")
+    np.testing.assert_allclose(moving.displacement, np.concatenate([once.displacement] * 2), rtol=0, atol=1e-15)
+    assert np.abs(once.displacement - still.displacement).max() > 1e-4
 
 
 def test_breaths_are_as_slow_as_the_size_of_an_animal_makes_them(still):

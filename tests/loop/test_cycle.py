@@ -56,6 +56,29 @@ def test_volumes_and_heart_rate_are_mapped():
     assert loop.time[-1] == pytest.approx(0.1 * 399 / 400)
 
 
+BEATS = [{}, {"length": 0.8, "stroke": 0.7}, {"length": 1.2, "stroke": 1.1}]
+
+
+def test_beats_follow_one_another_with_their_lengths_and_strokes():
+    one, cycle = read_loop(Loop(frames=300)), read_loop(Loop(frames=900, beats=BEATS))
+    assert cycle.starts == (0, 300, 540, 900) and cycle.period == pytest.approx(3 * 0.12)
+    np.testing.assert_allclose(np.diff(cycle.time), 0.12 / 300)
+    np.testing.assert_allclose(cycle.volume[list(cycle.starts[:-1])], 50 * UL, rtol=1e-12)
+    smallest = [cycle.volume[beat].min() / UL for beat in cycle.beats]
+    assert smallest == pytest.approx([18, 50 - 0.7 * 32, 50 - 1.1 * 32], rel=1e-3)
+    np.testing.assert_allclose([cycle.pressure[beat].max() for beat in cycle.beats], one.pressure.max(), rtol=1e-3)
+    np.testing.assert_allclose(cycle.volume[:300], one.volume, rtol=1e-12)
+    assert cycle.systole == one.systole and cycle.at(one.systole).beats[0] == slice(0, len(one.systole))
+    # Each beat has its end-systole at the same share of its length.
+    ends = [es_frame(cycle.pressure[beat], cycle.volume[beat]) for beat in cycle.beats]
+    assert np.divide(ends, (1, 0.8, 1.2)) == pytest.approx(len(one.systole) - 1, rel=0.03)
+
+
+def test_a_stroke_that_empties_the_heart_is_refused():
+    with pytest.raises(LoopError, match=r"loop\.beats: a stroke of 2 empties the heart; give less than 1\.56\."):
+        read_loop(Loop(beats=[{}, {"stroke": 2.0}]))
+
+
 def test_sampling_goes_through_the_rows_without_overshoot(tmp_path):
     loop = read_loop(written(tmp_path, GOOD))
     np.testing.assert_allclose(loop.pressure[::2] / MMHG, [4, 100, 100, 5])

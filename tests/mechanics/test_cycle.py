@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,9 +11,11 @@ from echotruth.config import Config, Geometry, Loop, Mechanics, Pathology
 from echotruth.config.building import configure
 from echotruth.heart import Heart
 from echotruth.loop.cycle import heart_cycle, read_loop
-from echotruth.mechanics.beat import beat
+from echotruth.loop.phases import CONTRACTION, FILLING
+from echotruth.mechanics.beat import beat, outputs
 from echotruth.mechanics.derived import centroid_kinematics
 from echotruth.mechanics.geometry import left_ventricle
+from echotruth.mechanics.physiology import measured_heart
 from echotruth.mechanics.solver.cycle import filled_to_end_diastole, solve
 from echotruth.mechanics.solver.newton import Diverged
 from echotruth.mechanics.solver.wall import equilibrium, wall
@@ -41,6 +44,33 @@ def cycle():
 @pytest.fixture(scope="module")
 def driven(cycle):
     return solved(cycle)
+
+
+def test_beats_are_solved_one_after_the_other_and_the_first_is_that_of_a_clip_of_its_own(cycle, driven):
+    beats = [{}, {"length": 0.8, "stroke": 0.7}, {"length": 1.2, "stroke": 1.1}]
+    config = CONFIG.model_copy(update={"loop": Loop(frames=36, beats=beats)})
+    arrays, starts = beat(config), config.loop.beat_starts
+    mechanics, body = arrays["mechanics"], wall(CONFIG, left_ventricle(COARSE))
+    np.testing.assert_allclose(mechanics["time"], np.arange(36) * cycle.time[1])
+    assert starts == [0, 12, 22, 36]
+    np.testing.assert_allclose(mechanics["volume"], heart_cycle(config).volume, rtol=1e-6)
+    alone = outputs(CONFIG, body, driven, cycle)
+    moved, expected = mechanics["displacement"], alone["mechanics"]["displacement"]
+    largest = np.ptp(expected, axis=0).max()
+    # Without viscosity the heart is at the end of each beat, and so at that of the clip, where it was at its beginning.
+    np.testing.assert_allclose(moved[starts[1:-1]], moved[[0, 0]], rtol=0, atol=1e-4 * largest)
+    np.testing.assert_allclose(moved[:12], expected, rtol=0, atol=1e-6 * largest)
+    assert mechanics["es_frame"] == alone["mechanics"]["es_frame"]
+    for start, end in pairwise(starts):
+        phase = mechanics["phase"][start:end]
+        assert phase[0] == CONTRACTION and phase[-1] == FILLING and np.count_nonzero(np.diff(phase)) == 3
+    found, bounds = measured_heart(arrays, config)
+    expected, its_bounds = measured_heart(alone, CONFIG)
+    of_clip = ("volume_ratio_min", "twist_max_deg", "tension_min_kPa", "loop_error_max")
+    for name in its_bounds.keys() - of_clip:
+        assert bounds[name] == pytest.approx(its_bounds[name], rel=1e-5, abs=1e-7), name
+    assert found["cardiac_output"] == pytest.approx(expected["cardiac_output"], rel=1e-6)
+    assert found["twist"].shape == (36,) and found["volume_ratio_min"] < expected["volume_ratio_min"]
 
 
 def test_volume_and_tension_give_back_the_pressure(cycle, driven):

@@ -166,6 +166,11 @@ def test_setting_changes_the_versions_of_the_stages_that_depend_on_it_and_no_oth
         assert version_of("bmode", before, "mid") != version_of("bmode", before, "long_axis")
 
 
+def test_beats_change_the_version_of_the_heart():
+    lengths = [[{}], [{}, {}], [{"length": 0.9}, {}], [{}, {"stroke": 0.9}]]
+    assert len({version_of("mechanics", Config.model_validate({"loop": {"beats": beats}})) for beats in lengths}) == 4
+
+
 @pytest.mark.parametrize(
     ("file", "tracker"),
     [

@@ -47,7 +47,7 @@ def _sweepable(section: Section, prefix: str) -> dict[str, Any]:
     """Dotted key -> value of all keys that can be swept; a list is one entry of the table."""
     values = {key: value for key, value in dotted_values(section.resolved(), prefix) if can_be_swept(key)}
     return {
-        key: " ".join(map(str, value)) if isinstance(value, list) else value
+        key: " ".join(map(str, value)) if isinstance(value, list | tuple) else value
         for key, value in values.items()
         if not isinstance(value, dict)
     }

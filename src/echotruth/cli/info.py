@@ -89,10 +89,12 @@ def _repository(found: Repository) -> dict[str, str]:
     made = ", ".join(f"{name} {packages[name]}" for name in ("echotruth", "numpy", "zarr") if name in packages)
     is_published = (found.folder / CHECKSUMS).is_file()
     sizes, (files, size) = ", ".join(map(str, found.sizes)), _size(found.folder)
+    beats = len(config.loop.beats)
+    of = "one cycle" if beats == 1 else f"{beats} beats"
     return {
         "repository": f"{found.folder}",
         "name": f"{config.name}, seed {config.seed}",
-        "heart": f"{config.geometry.file or config.geometry.preset}, {config.loop.frames} frames of one cycle",
+        "heart": f"{config.geometry.file or config.geometry.preset}, {config.loop.frames} frames of {of}",
         "cases": f"{len(cases)}: {statuses}",
         "views": f"{len(views)}: {', '.join(views)}",
         "sizes": f"{sizes} px, {config.bmode.field_of_view_mm:g} mm wide; array {config.probe.preset}",

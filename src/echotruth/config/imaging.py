@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, FiniteFloat
 
 from echotruth.config.presets import PRESETS
-from echotruth.section import Fraction, Name, Positive, Section, check, invalid
+from echotruth.section import Fraction, Name, Positive, Section, as_tuple, check, invalid
 
 Distance = Annotated[FiniteFloat, Field(ge=-1000, le=1000)]
 
@@ -208,11 +208,6 @@ Length = Annotated[FiniteFloat, Field(ge=0, le=1000)]
 FilterWidth = Annotated[FiniteFloat, Field(ge=0.5, le=64)]
 
 
-def _as_tuple(value: Any) -> Any:
-    """Convert a list, which YAML has, to the tuple that the strict model requires."""
-    return tuple(value) if isinstance(value, list) else value
-
-
 class TimeGain(Section):
     """Curve of gain over range, as the sliders of a scanner set it, on top of `bmode.tgc_dB_per_cm_MHz`."""
 
@@ -251,7 +246,7 @@ class Bmode(Section):
     """Side of the square image; the array is in the middle of its upper edge. Default: from `probe.preset`."""
     size_px: Annotated[int, Field(ge=32, le=4096)] = 512
     """Pixels along a side of the full image."""
-    downsampling: Annotated[tuple[Divisor, ...], Field(min_length=1), BeforeValidator(_as_tuple)] = (1, 2, 4)
+    downsampling: Annotated[tuple[Divisor, ...], Field(min_length=1), BeforeValidator(as_tuple)] = (1, 2, 4)
     """Image sizes, as divisors of the full size."""
     dynamic_range_dB: Annotated[FiniteFloat, Field(gt=10, le=120)] = 55.0
     """Range of the log compression below the brightest echo of the clip."""

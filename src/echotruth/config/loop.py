@@ -1,10 +1,11 @@
 """Section of the configuration: the pressure-volume loop, or the other cycle, that drives the heart."""
 
+from itertools import accumulate, pairwise
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import BeforeValidator, Field, FiniteFloat
 
-from echotruth.section import Positive, Section, check
+from echotruth.section import Positive, Section, as_tuple, check
 
 Volume = Annotated[FiniteFloat, Field(gt=0, le=1e8)]
 Pressure = Annotated[FiniteFloat, Field(gt=0, le=1e4)]
@@ -45,6 +46,15 @@ class Circulation(Section):
     """Beats after which a heart that is not yet steady is given up."""
 
 
+class Beat(Section):
+    """One beat of a clip: the cycle of the file, longer or shorter and with another stroke."""
+
+    length: Factor = 1.0
+    """Its period over that of the file or of `heart_rate_per_min`; the clip has it in whole frames."""
+    stroke: Factor = 1.0
+    """Its stroke volume over that of the cycle, from the same end-diastole and with the same pressures."""
+
+
 class Loop(Section):
     """The cycle that drives the heart: what is prescribed over time."""
 
@@ -80,7 +90,17 @@ class Loop(Section):
     (`geometry.surface_labels.right_endo`). In people at rest the systolic pressures are 21 +- 4 (Kovacs et al., Eur
     Respir J 34 (2009) 888; recalled) to 25 and some 120 mmHg."""
     frames: Annotated[int, Field(ge=2, le=1000)] = 40
-    """Frames of one cycle; frame 0 is end-diastole."""
+    """Frames of the clip, of all its beats; frame 0 is end-diastole."""
+    beats: Annotated[tuple[Beat, ...], BeforeValidator(as_tuple)] = (Beat(),)
+    """Beats of the clip, one after the other, 16 at most, as `[{}, {length: 0.8, stroke: 0.7}]`. The heart is solved
+    through all of them, and the clip closes. End-systole and the measures of the heart are those of the first beat;
+    drift, breathing and rocking of a view go by the mean beat."""
+
+    @property
+    def beat_starts(self) -> list[int]:
+        """First frame of each beat, and then the number of frames."""
+        ends = list(accumulate(beat.length for beat in self.beats))
+        return [0, *(round(self.frames * end / ends[-1]) for end in ends)]
 
     @check
     def _ejects(self) -> None:
@@ -88,6 +108,16 @@ class Loop(Section):
         self.require(ejects, "esv_uL", f"must be smaller than edv_uL = {self.edv_uL}")
         rises = self.edp_mmHg is None or self.esp_mmHg is None or self.esp_mmHg > self.edp_mmHg
         self.require(rises, "esp_mmHg", f"must be greater than edp_mmHg = {self.edp_mmHg}")
+
+    @check
+    def _has_beats(self) -> None:
+        self.require(1 <= len(self.beats) <= 16, "beats", "must have 1 to 16 beats")
+        for key, needed in {"kind": "measured", "prescribed": "pressure_volume"}.items():
+            remedy = f"must be {needed} with loop.beats, because other hearts repeat one beat"
+            self.require(self.beats == (Beat(),) or getattr(self, key) == needed, key, remedy)
+        fewest = min(end - start for start, end in pairwise(self.beat_starts))
+        remedy = f"leaves {fewest} to one of the loop.beats, which need two each: give more frames, or fewer beats"
+        self.require(fewest > 1, "frames", remedy)
 
     @check
     def _circulates(self) -> None:

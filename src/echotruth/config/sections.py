@@ -19,7 +19,7 @@ from echotruth.config.pathology import Pathology
 from echotruth.config.physiology import Physiology
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Neighbours, Realism
-from echotruth.config.tracking import PhaseCorrelation, Tracking
+from echotruth.config.tracking import BsplineCnn, PhaseCorrelation, Tracking
 from echotruth.section import OF_ZARR, Section, check, invalid, value_of
 
 _TRACKER_LENGTHS = ("window_mm", "windows_mm", "knots_mm")
@@ -77,8 +77,10 @@ class Config(Section):
         side, rf, tracking = self.bmode.field_of_view_mm, self.rf, self.tracking
         for name, tracker in tracking.trackers.items():
             self._check_tracker(f"tracking.trackers.{name}", tracker)
-        remedy = f"must be smaller than loop.frames = {self.loop.frames}, so that trackers are given two frames"
-        self.require(tracking.frame_step < self.loop.frames, "tracking.frame_step", remedy)
+        frames = int(np.diff(self.loop.beat_starts).min())
+        of = f"loop.frames = {frames}" if len(self.loop.beats) == 1 else f"the {frames} frames of the shortest beat"
+        remedy = f"must be smaller than {of}, so that trackers are given two frames"
+        self.require(tracking.frame_step < frames, "tracking.frame_step", remedy)
         depth, key = self.depth_mm, "bmode.field_of_view_mm" if rf.depth_mm is None else "rf.depth_mm"
         self.require(depth <= side, "rf.depth_mm", f"must not exceed bmode.field_of_view_mm = {side:g}")
         self.require(rf.focus_mm < depth, "rf.focus_mm", f"must be smaller than {key} = {depth:g}")
@@ -94,6 +96,16 @@ class Config(Section):
         for key in filter(type(tracker).model_fields.__contains__, _TRACKER_LENGTHS):
             lengths = np.ravel(getattr(tracker, key) or 0.0)
             self.require(lengths.max() <= side, f"{path}.{key}", f"must not exceed bmode.field_of_view_mm = {side:g}")
+
+    @check
+    def _check_beats(self) -> None:
+        one = len(self.loop.beats) == 1
+        default, remedy = self.loop.beats == Loop().beats, "must be beat with loop.beats: other motions have one beat"
+        self.require(default or self.motion.kind == "beat", "motion.kind", remedy)
+        self.require(one or not self.inference.tracker, "inference.tracker", "needs a loop of one beat: leave it out")
+        for name, tracker in self.tracking.trackers.items():
+            key, remedy = f"tracking.trackers.{name}.method", "knows a clip of one beat only: use bspline_dic"
+            self.require(one or not isinstance(tracker, BsplineCnn), key, remedy)
 
     @check
     def _check_inference(self) -> None:

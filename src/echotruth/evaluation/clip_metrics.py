@@ -84,6 +84,8 @@ class ClipTruth(NamedTuple):
         Frame of end-systole.
     curves : dict of ndarray
         Segment strain (frame, 17, component) and line strain (frame, contour), by their names in `COURSES`.
+    beat : int, optional
+        Frames of the first beat, in which peaks are sought. Default: all.
     """
 
     inside: NDArray[np.bool_]
@@ -95,6 +97,7 @@ class ClipTruth(NamedTuple):
     time: Floats
     es: int
     curves: dict[str, Floats]
+    beat: int | None = None
 
 
 def clip_metrics(
@@ -153,6 +156,7 @@ def clip_truth(repository: Repository, case: str, view: str) -> ClipTruth:
         time=frame_times(config.loop),
         es=int(repository.read("mechanics/es_frame", case)),
         curves={"segment_strain": segments, "line_strain": stored["true_line_strain"].astype(float)},
+        beat=config.loop.beat_starts[1],
     )
 
 
@@ -218,8 +222,8 @@ def clip_rows(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row
     displacement /= truth.unit
     within = np.linalg.norm(displacement - truth.displacement[..., :2], axis=-1) < reliability.WITHIN
     tracked = found["tracked_segment_strain"][:, _ENGINEERING].astype(float)
-    true = truth.curves["segment_strain"]
-    segments = segment_strain.segment_rows(tracked, true, truth.tissue, truth.plane, truth.time, truth.es)
+    tracked, true, time = (each[: truth.beat] for each in (tracked, truth.curves["segment_strain"], truth.time))
+    segments = segment_strain.segment_rows(tracked, true, truth.tissue, truth.plane, time, truth.es)
     clip: Row = {
         **_truth_metrics(truth),
         **metrics(found, truth.plane),

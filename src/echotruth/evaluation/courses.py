@@ -121,7 +121,7 @@ def rate(values: Floats, time: Floats) -> Floats:
 
 
 def peak(values: Floats, time: Floats, sign: ArrayLike | None = None) -> tuple[Floats, Floats]:
-    """Peak over the cycle: the value of largest magnitude, or the largest one in a direction, and its time.
+    """Peak over the frames given: the value of largest magnitude, or the largest one in a direction, and its time.
 
     Parameters
     ----------

@@ -48,6 +48,7 @@ def strain_curves(
         reference=reference,
         es_frame=es,
         end_systole=float(time[es]),
+        beat_frames=config.loop.beat_starts[1],
     )
 
 
@@ -63,8 +64,8 @@ def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
     -------
     Dataset
         For every curve NAME, without the dimension frame: `NAME_es`, its value at end-systole; `NAME_peak`, its value
-        of largest magnitude over the cycle; `NAME_time_to_peak`, s since end-diastole; and `NAME_systolic_rate`, the
-        largest rate from end-diastole to end-systole in the direction of the end-systolic value (of shortening the
+        of largest magnitude over the first beat; `NAME_time_to_peak`, s since end-diastole; and `NAME_systolic_rate`,
+        the largest rate from end-diastole to end-systole in the direction of the end-systolic value (of shortening the
         most negative one).
 
     Raises
@@ -91,7 +92,7 @@ def strain_peaks(strain: xr.Dataset) -> xr.Dataset:
             at_es = strain[of].isel(frame=es).transpose(*dims).values
             found[f"{of}_systolic_rate"] = (dims, systolic_rate(values[: es + 1], at_es), units)
             continue
-        value, when = peak(values, time)
+        value, when = peak(values[: strain.attrs.get("beat_frames")], time)
         found |= {
             f"{name}_es": (dims, values[es], units),
             f"{name}_peak": (dims, value, units),

@@ -57,6 +57,8 @@ class Truth:
         Since end-diastole, s.
     quantum : float
         Displacements are multiples of it, m; 0 if they are not rounded.
+    beat : int, optional
+        Frames of the first beat, in which peaks are sought. Default: all.
     """
 
     inside: np.ndarray
@@ -69,6 +71,7 @@ class Truth:
     contours: Contours
     time: np.ndarray
     quantum: float = 0.0
+    beat: int | None = None
 
     def on_grid(self, values: np.ndarray, axis: int) -> np.ndarray:
         """Values of the points on the whole grid: (..., point, ...) to (..., grid rows, grid columns, ...).
@@ -149,6 +152,7 @@ def stored_truth(arrays: Mapping[str, Any], kind: str, config: Config) -> Truth:
         contours=Contours(*(arrays[f"contour_{name}"] for name in ("position", "displacement", "index"))),
         time=frame_times(config.loop)[: len(motion)],
         quantum=length_quantum(config),
+        beat=config.loop.beat_starts[1],
     )
 
 
@@ -188,7 +192,8 @@ def truth_at(heart: Heart, plane: Plane, kind: str, position: np.ndarray, config
     strain.append(operator.strain(displacement))
     stored = single(np.stack(strain), rounding.STRAIN)
     lines, time = contours(heart, plane), frame_times(config.loop)[: len(heart.displacement)]
-    return Truth(inside, wall, operator, displacement, through_plane, stored, heart.es, lines, time, quantum)
+    beat = config.loop.beat_starts[1]
+    return Truth(inside, wall, operator, displacement, through_plane, stored, heart.es, lines, time, quantum, beat)
 
 
 def single(values: np.ndarray, quantum: float | None = None) -> np.ndarray:

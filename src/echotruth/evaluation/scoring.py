@@ -121,7 +121,7 @@ def curves(displacement: np.ndarray, strain: np.ndarray, truth: Truth) -> dict[s
     found = rounded_curves(strain_courses(strain, truth.wall) | motion)
     true, es = truth.courses, truth.es
     (tracked_peak, tracked_time), (true_peak, true_time) = (
-        peak(course["line_strain"], truth.time) for course in (found, true)
+        peak(course["line_strain"][: truth.beat], truth.time) for course in (found, true)
     )
     return {
         **{f"tracked_{name}": values for name, values in found.items()},

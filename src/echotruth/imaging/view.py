@@ -145,7 +145,7 @@ def moved(heart: Heart, plane: Plane, motion: ViewMotion, loop: Loop, time: Floa
     """
     if motion == ViewMotion():
         return heart
-    beat = period(loop)
+    beat = period(loop) / len(loop.beats)
     time = frame_times(loop)[: len(heart.displacement)] if time is None else time
     within = raised_cosine(2 * np.pi * time / beat)
     angle = motion.rocking_deg * deg * within

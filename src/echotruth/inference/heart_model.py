@@ -87,6 +87,8 @@ def elements(config: Config) -> tuple[int, int, int]:
 def _measured(observed: xr.Dataset, given: Config, folder: Path) -> Loop:
     """Measured loop of the pressure and the volume that were observed, with the four values that have errors."""
     name = f"the loop of {observed.attrs['case']}"
+    if len(given.loop.beats) > 1:
+        raise ObservationError(f"{name}: has {len(given.loop.beats)} beats: give a heart whose loop.beats is one")
     pressure, volume = (observed[curve].values.astype(float) for curve in ("pressure", "volume"))
     if not (np.isfinite(pressure).all() and np.isfinite(volume).all()):
         raise ObservationError(f"{name}: a pressure or volume is not finite: give all frames of a cycle")

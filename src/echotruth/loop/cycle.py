@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise, starmap
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ _MAX_FIRST_TENSION = 0.05
 
 @dataclass(frozen=True)
 class Cycle:
-    """One cycle at equal steps of time, beginning at end-diastole.
+    """One closed cycle of one beat or more, at equal steps of time, beginning at end-diastole.
 
     Attributes
     ----------
@@ -58,6 +59,8 @@ class Cycle:
     volume : ndarray of shape (n_frames,), m^3, or None if it is to be solved
     tension : ndarray of shape (n_frames,), Pa, or None if it is to be solved
         Active tension T_Ca.
+    starts : tuple of int
+        First frame of each beat, at end-diastole, and then the number of frames.
     """
 
     source: str
@@ -67,6 +70,12 @@ class Cycle:
     pressure: Floats | None
     volume: Floats | None
     tension: Floats | None
+    starts: tuple[int, ...]
+
+    @property
+    def beats(self) -> list[slice]:
+        """Frames of each beat."""
+        return list(starmap(slice, pairwise(self.starts)))
 
     @property
     def edv(self) -> float:
@@ -76,7 +85,7 @@ class Cycle:
 
     @property
     def systole(self) -> list[int]:
-        """Frames from end-diastole to end-systole.
+        """Frames from end-diastole to end-systole of the first beat.
 
         Raises
         ------
@@ -85,13 +94,15 @@ class Cycle:
         """
         if self.pressure is None or self.volume is None:
             raise LoopError(f"{self.source}: has no pressure or no volume, and so no end-systole: use pressure_volume")
-        return list(range(es_frame(self.pressure, self.volume) + 1))
+        first = self.beats[0]
+        return list(range(es_frame(self.pressure[first], self.volume[first]) + 1))
 
     def at(self, frames: Sequence[int]) -> Cycle:
         """The cycle in some of its frames, of which the first is end-diastole."""
         chosen = list(frames)
         pressure, volume, tension = (None if curve is None else curve[chosen] for curve in self._curves)
-        return replace(self, time=self.time[chosen], pressure=pressure, volume=volume, tension=tension)
+        starts = tuple(np.searchsorted(chosen, self.starts).tolist())
+        return replace(self, time=self.time[chosen], pressure=pressure, volume=volume, tension=tension, starts=starts)
 
     @property
     def _curves(self) -> tuple[Floats | None, ...]:
@@ -134,7 +145,8 @@ def read_loop(loop: Loop, size: float = 1.0) -> Cycle:
     Returns
     -------
     Cycle
-        Interpolated between the rows of the file by a monotone cubic (PCHIP), periodic in time.
+        Interpolated between the rows of the file by a monotone cubic (PCHIP), periodic in time; of each beat the
+        volume is V_ED + stroke (V - V_ED), over its frames.
 
     Raises
     ------
@@ -144,13 +156,19 @@ def read_loop(loop: Loop, size: float = 1.0) -> Cycle:
     recording, curves = _read_recording(loop), recorded_curves(loop, size)
     time = curves.pop("time")
     assert time is not None
-    period, phase = _period(recording, loop), np.arange(loop.frames) / loop.frames
+    starts = np.array(loop.beat_starts)
+    frames = np.diff(starts)
+    phase = (np.arange(loop.frames) - np.repeat(starts[:-1], frames)) / np.repeat(frames, frames)
     sampled = {
         name: None if values is None else _resample(time / time[-1], values, phase) for name, values in curves.items()
     }
+    if sampled["volume"] is not None:
+        stroke = np.repeat([beat.stroke for beat in loop.beats], frames)
+        sampled["volume"] = stroke * sampled["volume"] + (1 - stroke) * sampled["volume"][0]
     if loop.prescribed == "volume" and sampled["tension"] is None:
         sampled["tension"] = np.zeros(loop.frames)
-    return Cycle(str(recording.path), loop.prescribed, period, phase * period, **sampled)
+    period, time = _period(recording, loop), frame_times(loop)
+    return Cycle(str(recording.path), loop.prescribed, period, time, **sampled, starts=tuple(loop.beat_starts))
 
 
 def check_loop(loop: Loop, size: float = 1.0) -> None:
@@ -203,7 +221,7 @@ def frame_times(loop: Loop) -> Floats:
 
 
 def period(loop: Loop) -> float:
-    """Period of a cycle, s; raises as :func:`frame_times`."""
+    """Period of a cycle, of all its beats, s; raises as :func:`frame_times`."""
     return _period(_read_recording(loop), loop)
 
 
@@ -236,10 +254,10 @@ def recorded_curves(loop: Loop, size: float = 1.0) -> dict[str, Floats | None]:
 
 
 def _period(recording: Recording, loop: Loop) -> float:
-    """Duration of a cycle, s."""
+    """Duration of a cycle, of all its beats, s."""
     time, rate = recording.si("time"), loop.heart_rate_per_min
     assert time is not None
-    return float(time[-1]) if rate is None else 1 / (rate * per_min)
+    return sum(beat.length for beat in loop.beats) * (float(time[-1]) if rate is None else 1 / (rate * per_min))
 
 
 def _read_recording(loop: Loop) -> Recording:
@@ -316,6 +334,9 @@ def _map_volume(path: Path, volume: Floats, loop: Loop, size: float) -> Floats:
     if esv >= edv:
         volumes = f"the end-systolic volume is {esv * 1e9:g} uL and the end-diastolic {edv * 1e9:g} uL"
         raise LoopError(f"{path}: {volumes}; set edv_uL and esv_uL so that the heart ejects.")
+    stroke, most = max(beat.stroke for beat in loop.beats), edv / (edv - esv)
+    if stroke >= most:
+        raise LoopError(f"loop.beats: a stroke of {stroke:g} empties the heart; give less than {most:.3g}.")
     return esv + (volume - smallest) * ((edv - esv) / (first - smallest))
 
 

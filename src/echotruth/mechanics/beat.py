@@ -77,17 +77,21 @@ def outputs(
     config: Config, unloaded: Wall, solved: SolvedCycle, whole: Cycle, frames: Sequence[int] | None = None
 ) -> dict[str, Arrays]:
     """Groups of a heart that was solved in some frames of a whole cycle, or in all; as of :func:`beat`."""
+    pressure, volume = solved.pressure, solved.volume
+    first = (whole if frames is None else whole.at(frames)).beats[0]
+    es = phases.es_frame(pressure[first], volume[first])
     if frames is None:
-        frames, phase = range(len(whole.time)), phases.phases(solved.pressure, solved.volume)
+        frames = range(len(whole.time))
     else:
         assert whole.pressure is not None and whole.volume is not None
-        phase = phases.phases(whole.pressure, whole.volume)[list(frames)]
+        pressure, volume = whole.pressure, whole.volume
+    phase = np.concatenate([phases.phases(pressure[beat], volume[beat]) for beat in whole.beats])
     mechanics = vars(solved) | {
         "time": whole.time[list(frames)],
         "displacement": held(unloaded.mesh, solved.displacement, config.mechanics.hold),
         "stiffness": np.array(solved.stiffness),
-        "es_frame": np.array(phases.es_frame(solved.pressure, solved.volume)),
-        "phase": phase,
+        "es_frame": np.array(es),
+        "phase": phase[list(frames)],
     }
     return collect_outputs(config, unloaded, mechanics)
 

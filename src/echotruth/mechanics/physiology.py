@@ -23,6 +23,12 @@ from echotruth.mechanics.kinematics import group_means
 from echotruth.mechanics.outputs import Arrays
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
 
+OF_CLIP = (
+    *("rotation_base", "rotation_apex", "twist", "apex_motion", "base_motion"),
+    *("volume_ratio_min", "loop_error", "tension_min"),
+)
+"""Measures of all frames, where the others are those of the first beat: curves, and what a bad solution shows in."""
+
 DENSITY = 1050.0
 """Of heart muscle, kg/m^3: 1.05 g/mL, by which MRI turns the volume of a wall into its mass (Petersen 2017, doi
 10.1186/s12968-017-0327-9)."""
@@ -87,20 +93,28 @@ def measured_heart(groups: dict[str, Arrays], config: Config) -> tuple[Arrays, d
     Returns
     -------
     measures : dict of ndarray
-        The group `physiology`.
+        The group `physiology`: of the first beat, but for `OF_CLIP`.
     bounded : dict
         As :func:`bounded` returns it; empty for prescribed motions, to which the bounds do not apply.
     """
-    loop = heart_cycle(config)
-    mechanics = groups["mechanics"] | {"time": loop.time}
-    found = measures(groups["geometry"], mechanics, groups["kinematics"], groups["fibres"]["wall_depth"])
+    loop, geometry, depth = heart_cycle(config), groups["geometry"], groups["fibres"]["wall_depth"]
+    mechanics, kinematics = groups["mechanics"] | {"time": loop.time}, groups["kinematics"]
+    found = measures(geometry, mechanics, kinematics, depth)
+    if len(loop.beats) > 1:
+        of_clip, first = {name: found[name] for name in OF_CLIP}, loop.beats[0]
+        found = measures(geometry, _cut(mechanics, first), _cut(kinematics, first), depth) | of_clip
     if config.motion.kind != "beat":
         return found, {}
     # With a given stiffness, what the healthy heart holds follows from it, and is not that of the loop.
     is_held = loop.volume is not None and config.mechanics.material.stiffness_kPa is None
     healthy = loop.edv if is_held else np.nan
-    others = {"active_tension": mechanics["active_tension"], "edv_of_healthy": found["edv"] / healthy}
+    others = {"active_tension": mechanics["active_tension"][loop.beats[0]], "edv_of_healthy": found["edv"] / healthy}
     return found, bounded(found | others)
+
+
+def _cut(group: Arrays, frames: slice) -> Arrays:
+    """Arrays of a group in some frames, which are the first dimension of all that have one."""
+    return {name: values[frames] if values.ndim else values for name, values in group.items()}
 
 
 def _pump(mesh: Mesh, mechanics: Arrays) -> Arrays:

@@ -351,8 +351,8 @@ class Repository:
             a short axis and longitudinal (GLS) in a long axis; `rotation` (frame), rad, counter-clockwise seen from the
             apex, NaN in a long axis; and of each its `_rate`, per second. Measures are `engineering` and
             `green_lagrange`, components RR (radial), TT (circumferential or longitudinal) and RT (shear; engineering:
-            rad). `time` (frame) is in s, and the attributes have es_frame and end_systole (s). The true curves do not
-            depend on the tracker.
+            rad). `time` (frame) is in s, and the attributes have es_frame, end_systole (s) and beat_frames, the
+            number of frames of the first beat. The true curves do not depend on the tracker.
 
         Raises
         ------

@@ -51,12 +51,13 @@ def aortic_opening(volume: Floats) -> Floats:
 
 
 def course(of_volumes: Callable[[Floats], Floats], heart: Heart, between: Sequence[float] = ()) -> Floats:
-    """What follows from the volumes of a cycle, such as :func:`opening`, in all frames of a heart, (frame,).
+    """What follows from the volumes of a beat, such as :func:`opening`, in all frames of a heart, (frame,).
 
     Frames that come after those of the cycle, at fractional numbers of these, are linear between them.
     """
     cycle = len(heart.displacement) - len(between)
-    of_frames = of_volumes(volumes(heart)[:cycle])
+    starts = [] if heart.config is None else heart.config.loop.beat_starts[1:-1]
+    of_frames = np.concatenate([of_volumes(beat) for beat in np.split(volumes(heart)[:cycle], starts)])
     return np.append(of_frames, np.interp(np.asarray(between), np.arange(cycle), of_frames, period=cycle))
 
 

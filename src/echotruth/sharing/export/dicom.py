@@ -107,7 +107,7 @@ def _pixels(image: Any, clip: ExportedClip) -> None:
     image.Rows, image.Columns, image.NumberOfFrames = rows, columns, frames
     image.FrameIncrementPointer = 0x00181063
     image.FrameTime = f"{1e3 * clip.frame_time:.10g}"  # ms, in at most 16 characters, as the format has it
-    image.HeartRate = round(60 / (frames * clip.frame_time))
+    image.HeartRate = round(60 * len(clip.case.config.loop.beats) / (frames * clip.frame_time))
     image.add_new(0x7FE00010, "OB", clip.image.tobytes() + b"\0" * (clip.image.size % 2))
 
 

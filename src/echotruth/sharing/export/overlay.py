@@ -100,7 +100,8 @@ def _scale(clip: ExportedClip, frames: Pictures) -> None:
             level = round((depth - start) / clip.spacing - 0.5)
             _bar(frame, (level, level), (at, right), thickness)
         _bar(frame, (row, row), (left, size // 2), thickness)
-        for moment, height in ((0.0, 3 * margin), (es, margin)):
+        spikes = ((clip.time[start], 3 * margin) for start in clip.case.config.loop.beat_starts[:-1])
+        for moment, height in (*spikes, (es, margin)):
             column = round(left + moment / period * (size // 2 - left))
             _bar(frame, (row - height, row), (column, column), thickness)
         column = round(left + time / period * (size // 2 - left))
