@@ -39,8 +39,11 @@ INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.p
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(INTEGRATION)
 
+# It finds in .venv what both need, and holds only the rest.
 .venv-integration/ready: .venv/ready integration.lock
 	$(BIN)/python -m venv --clear .venv-integration
+	for packages in .venv/lib/python*/site-packages; do \
+		echo "$(CURDIR)/$$packages" > ".venv-integration$${packages#.venv}/shared.pth"; done
 	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --require-hashes --no-deps -r integration.lock
 	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check "torch==2.13.0"
 	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --no-build-isolation --no-deps -e .

@@ -48,7 +48,7 @@ DEPTH_PX = 110
 """Depth to which all sectors are scaled, px, so that all are as coarse as those of echonet/dynamic."""
 FRAMES, SHOWN = 24, (0, 1, 6, 7, 8, 9, 14, 15, 21)
 """Frames of a cycle of ours, and those that are imaged."""
-DRAWS = 24
+DRAWS = 20
 """Clips of which the acoustics are drawn."""
 SIZE, BLACK = 256, 4
 """Pixels along a side of ours, and the grey level up to which a pixel is black."""

@@ -26,14 +26,13 @@ probe: {elements: 16}
 rf: {lines: 32, focal_zones: 1}
 bmode: {size_px: 64, downsampling: [1]}
 tracking: {trackers: {dis: {method: dis}}}
-cases: {seed: [1, 2]}
 """
-"""A run that takes seconds: one heart, which moves as a rigid body, seen with two seeds."""
+"""A run that takes seconds: one heart, which moves as a rigid body, in one view."""
 
 
-def alone(folder: Path, config: str = CONFIG) -> Path:
+def alone(folder: Path) -> Path:
     """Folder of the repository that its jobs make in this process, one after the other."""
-    return finish(folder / "tiny", et.configure(yaml.safe_load(config)), solved)
+    return finish(folder / "tiny", et.configure(yaml.safe_load(CONFIG)), solved)
 
 
 class Workspace:

@@ -53,7 +53,8 @@ def test_commands_are_found_on_the_pages():
 FIRST_PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/start/*.md"))]
 COARSE = {
     "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
-    **{"loop": {"frames": 4}, "bmode": {"size_px": 128, "downsampling": [1]}, "rf": {"lines": 24}},
+    **{"loop": {"frames": 4}, "bmode": {"size_px": 128, "downsampling": [1]}, "rf": {"lines": 24, "focal_zones": 1}},
+    "phantom": {"density_per_mm3": 300.0},
 }
 """Heart and images that are made in seconds."""
 

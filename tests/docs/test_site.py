@@ -6,10 +6,12 @@ import re
 import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from html import unescape
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
+import learning_repository
 import pytest
 
 import echotruth as et
@@ -31,6 +33,10 @@ def site(tmp_path_factory):
         shutil.copytree(ROOT / name, source / name, ignore=MADE)
     for page in [*ROOT.glob("*.md"), ROOT / "CITATION.cff"]:
         shutil.copy(page, source)
+    with chdir(source / "docs/notebooks"):
+        learning_repository.make(
+            Path("out/first"), et.configure("first.yaml")
+        )  # the run in a notebook draws its report
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-b", "html", "-c", "docs", ".", "built"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])}
     done = subprocess.run(

@@ -139,14 +139,7 @@ def test_changed_hearts_change_as_in_life(healthy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("species", "disease"),
-    [
-        *(("mouse", disease) for disease in DISEASES),
-        *(("human", disease) for disease in ("healthy", "old", "lbbb", "hypertension", "dcm")),
-        *(("rat", disease) for disease in ("healthy", "dcm")),
-    ],
-)
+@pytest.mark.parametrize(("species", "disease"), [("mouse", "old"), ("rat", "dcm"), ("human", "lbbb")])
 def test_heart_is_within_the_bounds_of_its_diagnosis(species, disease):
     config, arrays, _, values = diseased(disease, species)
     assert violation(values, bounds_of(config)) == ""

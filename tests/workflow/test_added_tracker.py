@@ -20,7 +20,7 @@ from echotruth.evaluation.tracker_options import parse_tracker
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.repository.check import check
 from echotruth.units import mm
-from echotruth.workflow.added_tracker import prepare
+from echotruth.workflow.added_tracker import AddedTracker, prepare
 from echotruth.workflow.job import Job
 
 COURSE = np.array([0, 0.4, 1, 0.3])
@@ -100,17 +100,24 @@ def folder(made, tmp_path):
     return shutil.copytree(made, tmp_path / "small")
 
 
+def run_here(added, case_view):
+    """Do the job in this process: to start one takes longer than to track."""
+    do(Job(added.repository.folder, "tracking", *case_view, added.name), solved)
+
+
 @pytest.fixture
-def evaluate(folder, tmp_path, monkeypatch, capsys):
+def evaluate(tmp_path, monkeypatch, capsys):
     """Run the command where the trackers are; its status, output and errors."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", sys.path[:])
     monkeypatch.delitem(sys.modules, "custom", raising=False)
     Path("custom.py").write_text(CUSTOM)
 
-    def run(*arguments, repository=folder):
+    def run(repository, *arguments, in_processes=False):
         monkeypatch.setattr(sys, "argv", ["echotruth", "evaluate", str(repository), *map(str, arguments)])
-        with pytest.raises(SystemExit) as left:
+        with monkeypatch.context() as patch, pytest.raises(SystemExit) as left:
+            if not in_processes:
+                patch.setattr(AddedTracker, "_run", run_here)
             main()
         return left.value.code, *capsys.readouterr()
 
@@ -144,7 +151,7 @@ def test_tracker_that_knows_the_motion_has_no_error_at_any_size(folder, evaluate
     gradient, shift = in_image(folder, affine, "mid")
     options = {"course": COURSE.tolist(), "gradient": gradient.tolist(), "shift": shift.tolist()}
     given = [word for key, value in options.items() for word in ("--option", f"{key}={value}")]
-    status, output, errors = evaluate("--tracker", "custom:exact", *ONE, *given)
+    status, output, errors = evaluate(folder, "--tracker", "custom:exact", *ONE, *given)
     assert (status, errors) == (0, "") and f"custom_exact is a tracker of {folder}" in output
     table = scores(folder, "custom_exact")
     assert list(table["size_px"]) == [128, 64]
@@ -154,7 +161,7 @@ def test_tracker_that_knows_the_motion_has_no_error_at_any_size(folder, evaluate
 
 def test_every_complete_clip_is_tried_and_no_other_and_who_sees_no_motion_is_off_by_all_of_it(folder, evaluate):
     shutil.rmtree(folder / f"small.zarr/clips/{SECOND}/apex/bmode/128")
-    status, output, _ = evaluate("--tracker", "custom:still", "--jobs", "2")
+    status, output, _ = evaluate(folder, "--tracker", "custom:still")
     clips = [(*place, size) for place in ((FIRST, "mid"), (FIRST, "apex"), (SECOND, "mid")) for size in (128, 64)]
     table = scores(folder, "custom_still")
     assert status == 0 and set(table[["case", "view", "size_px"]].itertuples(index=False, name=None)) == {*clips}
@@ -166,7 +173,7 @@ def test_every_complete_clip_is_tried_and_no_other_and_who_sees_no_motion_is_off
 
 
 def test_failure_at_one_size_is_told_and_the_other_is_scored(folder, evaluate):
-    status, output, _ = evaluate("--tracker", "custom:small_only", *ONE)
+    status, output, _ = evaluate(folder, "--tracker", "custom:small_only", *ONE)
     table = scores(folder, "custom_small_only").set_index("size_px")
     assert status == 0 and "no room" in output
     assert table.loc[128, "failure"].startswith("custom:small_only raised MemoryError: no room")
@@ -175,7 +182,7 @@ def test_failure_at_one_size_is_told_and_the_other_is_scored(folder, evaluate):
 
 
 def test_tracker_that_fails_everywhere_ends_with_status_1(folder, evaluate):
-    status, output, errors = evaluate("--tracker", "custom:nowhere", *ONE)
+    status, output, errors = evaluate(folder, "--tracker", "custom:nowhere", *ONE)
     assert (status, errors) == (1, "") and output.count("raised MemoryError: no room") == 2
     assert (scores(folder, "custom_nowhere")["nrmse_all_percent"] == 100).all()
 
@@ -184,9 +191,9 @@ def test_tracker_that_fails_everywhere_ends_with_status_1(folder, evaluate):
 def test_program_and_method_of_ours_are_tried_too(folder, evaluate):
     Path("program.py").write_text(PROGRAM)
     command = f"'{sys.executable}' program.py {{input}} {{output}}"
-    assert evaluate("--command", command, "--name", "program", *ONE)[0] == 0
+    assert evaluate(folder, "--command", command, "--name", "program", *ONE)[0] == 0
     np.testing.assert_allclose(scores(folder, "program")["nrmse_percent"], 100)
-    assert evaluate("--tracker", "dis", "--option", "preset=fast", *ONE)[0] == 0
+    assert evaluate(folder, "--tracker", "dis", "--option", "preset=fast", *ONE)[0] == 0
     assert scores(folder, "dis")["nrmse_percent"].notna().all()
     assert et.Repository(folder).config.tracking.trackers["dis"] == Dis(preset="fast")
 
@@ -195,7 +202,8 @@ def test_program_and_method_of_ours_are_tried_too(folder, evaluate):
 def test_tracker_of_the_configuration_leaves_the_bytes_that_it_leaves_by_the_command_in_any_number_of_processes(
     folder, evaluate
 ):
-    assert evaluate("--tracker", "custom:drawn", "--view", "mid", "--jobs", "2")[0] == 0
+    drawn = ("--tracker", "custom:drawn", "--view", "mid", "--jobs", "2")
+    assert evaluate(folder, *drawn, in_processes=True)[0] == 0
     for case in (FIRST, SECOND):
         do(Job(folder, "tracking", case, "mid", "lot"), solved)
         found = [bytes_of(folder / f"small.zarr/clips/{case}/mid/tracking/{name}") for name in ("lot", "custom_drawn")]
@@ -206,7 +214,7 @@ def test_tracker_of_the_configuration_leaves_the_bytes_that_it_leaves_by_the_com
 def test_later_evaluation_replaces_its_own_groups_and_touches_no_others(folder, evaluate):
     for name, tracker in (("one", "custom:still"), ("two", "custom:still"), ("one", "custom:drawn")):
         before = content(folder)
-        assert evaluate("--tracker", tracker, "--name", name, *ONE)[0] == 0
+        assert evaluate(folder, "--tracker", tracker, "--name", name, *ONE)[0] == 0
     after, own = content(folder), f"small.zarr/clips/{FIRST}/mid/tracking/one/"
     differ = {name for name in {*before, *after} if before.get(name) != after.get(name)}
     described = {"config.yaml", "SHA256SUMS", "small.zarr/zarr.json", f"small.zarr/clips/{FIRST}/mid/zarr.json"}
@@ -225,11 +233,16 @@ def tracked_by_mine(job):
     return solved(job) if job.tracker == "mine" else blank(job)
 
 
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    return finish(tmp_path_factory.mktemp("small") / "small", SMALL)
+
+
 @pytest.fixture
-def added(tmp_path, evaluate):
+def added(small, tmp_path, evaluate):
     """A repository of one clip to which `mine` was added."""
-    folder = finish(tmp_path / "added", SMALL)
-    status, _, errors = evaluate("--tracker", "custom:still", "--name", "mine", repository=folder)
+    folder = shutil.copytree(small, tmp_path / "added")
+    status, _, errors = evaluate(folder, "--tracker", "custom:still", "--name", "mine")
     assert (status, errors) == (0, "")
     return folder
 
@@ -253,16 +266,16 @@ def test_run_makes_an_added_tracker_again_for_other_images(added):
 def test_tracker_that_the_configuration_has_by_now_is_its_own(added, evaluate):
     config = SMALL.model_copy(update={"tracking": Tracking(trackers={"mine": Dis()})})
     remake(added, config)
-    status, _, errors = evaluate("--tracker", "custom:still", "--name", "mine", repository=added)
+    status, _, errors = evaluate(added, "--tracker", "custom:still", "--name", "mine")
     assert status == 2 and "mine is already a tracker of" in errors
-    assert evaluate("--tracker", "custom:still", "--name", "other", repository=added)[0] == 0
+    assert evaluate(added, "--tracker", "custom:still", "--name", "other")[0] == 0
     assert et.Repository(added).config.tracking.trackers["mine"] == Dis()
 
 
 @pytest.mark.slow
 def test_tracker_that_ends_its_process_is_told_in_one_sentence_and_leaves_the_repository_as_it_was(folder, evaluate):
     before = content(folder)
-    status, _, errors = evaluate("--tracker", "custom:second_crashes", "--view", "mid")
+    status, _, errors = evaluate(folder, "--tracker", "custom:second_crashes", "--view", "mid", in_processes=True)
     assert status == 2 and errors.count("\n") == 1 and f"on {SECOND} mid: its process ended" in errors
     assert "--command" in errors and not (folder / "trackers.yaml").exists()
     assert content(folder) == before and not check(folder).faults
@@ -272,7 +285,8 @@ def test_tracker_that_ends_its_process_is_told_in_one_sentence_and_leaves_the_re
 def test_tracker_that_crashes_under_the_name_of_one_that_was_added_leaves_that_one_its_settings(added, evaluate):
     before = content(added), (added / "trackers.yaml").read_bytes()
     Path("began").write_text("by another process")
-    assert evaluate("--tracker", "custom:second_crashes", "--name", "mine", repository=added)[0] == 2
+    crashing = ("--tracker", "custom:second_crashes", "--name", "mine")
+    assert evaluate(added, *crashing, in_processes=True)[0] == 2
     assert (content(added), (added / "trackers.yaml").read_bytes()) == before
 
 
@@ -293,7 +307,7 @@ DAMAGED = {"zarr.json": misshapen, "c/0/0/0": flipped}
 def test_damaged_clip_is_refused_in_one_sentence(folder, evaluate, file):
     path = folder / f"small.zarr/clips/{FIRST}/mid/bmode/128/image" / file
     path.write_bytes(DAMAGED[file](path.read_bytes()))
-    status, _, errors = evaluate("--tracker", "custom:still", *ONE)
+    status, _, errors = evaluate(folder, "--tracker", "custom:still", *ONE, in_processes=True)
     assert (status, errors.count("\n")) == (2, 1) and f"{path} is not what was written" in errors
     assert "trackers.yaml" not in {path.name for path in folder.iterdir()}
 
@@ -373,36 +387,36 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_invalid_evaluation_is_refused_in_one_sentence(folder, evaluate, case):
+def test_invalid_evaluation_is_refused_in_one_sentence(made, evaluate, case):
     arguments, expected = REFUSED[case]
-    status, output, errors = evaluate(*arguments)
+    status, output, errors = evaluate(made, *arguments)
     assert (status, output) == (2, "") and errors.count("\n") == 1
-    assert expected.format(folder=folder) in errors
+    assert expected.format(folder=made) in errors
 
 
 @pytest.mark.parametrize("name", ["nowhere", "."])
 def test_folder_that_is_no_repository_is_refused_in_one_sentence(evaluate, name):
-    status, output, errors = evaluate("--tracker", "a:b", repository=name)
+    status, output, errors = evaluate(name, "--tracker", "a:b")
     assert (status, output, errors.count("\n")) == (2, "", 1) and f"{name}: is not a repository" in errors
 
 
 def test_repository_that_was_not_run_is_refused_in_one_sentence(folder, evaluate, tmp_path):
     shutil.rmtree(folder / "small.zarr")
-    status, _, errors = evaluate("--tracker", "custom:still")
+    status, _, errors = evaluate(folder, "--tracker", "custom:still")
     assert (status, errors.count("\n")) == (2, 1) and "no complete clip" in errors
 
 
 def test_repository_on_which_a_run_works_is_refused_in_one_sentence(folder, evaluate):
     with (folder / ".lock").open("ab") as run:
         fcntl.flock(run, fcntl.LOCK_EX)
-        status, output, errors = evaluate("--tracker", "custom:still")
+        status, output, errors = evaluate(folder, "--tracker", "custom:still")
     assert (status, output, errors.count("\n")) == (2, "", 1) and "another run works on it" in errors
     assert not (folder / "trackers.yaml").exists()
 
 
 def test_folder_that_cannot_be_written_is_refused_before_the_first_clip(folder, evaluate):
     (folder / "trackers.yaml").mkdir()
-    status, output, errors = evaluate("--tracker", "custom:still")
+    status, output, errors = evaluate(folder, "--tracker", "custom:still")
     assert (status, output, errors.count("\n")) == (2, "", 1) and "trackers.yaml: Is a directory: the folder" in errors
 
 

@@ -42,16 +42,23 @@ def made(tmp_path_factory):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("order", "result", "whole"), [(0, blank, "made"), (2, solved, "finished")])
-def test_repository_that_grew_in_any_order_is_one_that_was_made_at_once(request, tmp_path, order, result, whole):
+def test_repository_that_grew_in_any_order_is_one_that_was_made_at_once(made, tmp_path):
     left, steps = dict(GROWN), sorted(GROWN)
-    random.Random(order).shuffle(steps)
-    finish(tmp_path / "finished", smaller(**left), result)
+    random.Random(0).shuffle(steps)
+    finish(tmp_path / "finished", smaller(**left))
     for section in steps:
         del left[section]
-        done = remake(tmp_path / "finished", smaller(**left), result)
+        done = remake(tmp_path / "finished", smaller(**left))
         assert len(done) > 1 and not (section != "cases" and any("mechanics" in job for job in done))
-    assert content(tmp_path / "finished") == content(request.getfixturevalue(whole))
+    assert content(tmp_path / "finished") == content(made)
+
+
+@pytest.mark.slow
+def test_scripts_make_the_bytes_of_a_repository_that_grew_those_of_one_that_was_made_at_once(finished, tmp_path):
+    """A heart and a tracker are added: nothing that a script makes depends on what was made before it."""
+    finish(tmp_path / "finished", smaller(cases=GROWN["cases"], tracking=GROWN["tracking"]), solved)
+    remake(tmp_path / "finished", FINISHED, solved)
+    assert content(tmp_path / "finished") == content(finished)
 
 
 def test_merged_repositories_are_one_that_was_made_at_once(made, tmp_path):
