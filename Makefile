@@ -60,9 +60,10 @@ test-integration: .venv-integration/ready
 docs: .venv-integration/ready  ## the site, in out/site
 	.venv-integration/bin/python -m sphinx -W --keep-going -b html -c docs . out/site
 
-pictures: .venv/ready  ## of docs/gallery; twenty minutes
+pictures: .venv/ready  ## of docs/gallery; half an hour; MICE is the folder of real mice (benchmarks/realism.py)
 	$(BIN)/python benchmarks/physiology_pictures.py
-	$(BIN)/python benchmarks/realism_picture.py
+	$(BIN)/python benchmarks/realism_picture.py $(MICE:%=--mice %)
+	$(BIN)/python benchmarks/moving_pictures.py $(MICE:%=--mice %)
 	$(BIN)/python benchmarks/doppler_pictures.py
 	$(BIN)/echotruth run config/demo.yaml
 	$(BIN)/python benchmarks/gallery_pictures.py out/demo

@@ -1,34 +1,33 @@
 """The picture of docs/realism.md: ideal, realistic and real clips side by side, at end-diastole and end-systole.
 
-    python benchmarks/realism_picture.py
+    python benchmarks/realism_picture.py --mice FOLDER
 
-The real clip is the example `ybr_color` of the package pydicom (MIT), an apical four-chamber view of a human heart. The
-hearts have 12 x 6 x 1 elements and 16 frames, of which two are imaged.
+The real clips are the example `ybr_color` of the package pydicom (MIT), an apical four-chamber view of a human heart,
+and in the folder example/images/segmentation.mp4 of the repository sunjaeyoon/echo_segmentation (MIT), a mouse in short
+axis, which is left out without it. The hearts have 12 x 6 x 1 elements and 24 frames, of which two are imaged.
 """
 
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 import apical_clip
 import numpy as np
 import realism
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from moving_pictures import LOGO, falls
 from numpy.typing import NDArray
 from physiology_pictures import ELEMENTS, save
 
 import echotruth as et
 from echotruth.config import Config
-from echotruth.imaging.bmode import bmode_clip, clip_gain
-from echotruth.imaging.sequence import Sequence
-from echotruth.imaging.view import before_probe
 from echotruth.report import style
 from echotruth.report.clip import round_length
 
-FRAMES = 16
 REAL_MM, REAL_TIP, REAL_FRAMES = 1.021, (8.5, 169.5), (21, 5)
 """Of the real clip: side of a pixel (its field PhysicalDeltaX is that of the clip at twice the size), row and column of
 the tip of its sector (px), and the frames in which the mitral valve shuts and opens."""
@@ -65,14 +64,9 @@ class Pair(NamedTuple):
 
 def imaged(heart: et.Heart, config: Config, view: str) -> Pair:
     """A view of a heart at end-diastole and end-systole."""
-    shown, plane = before_probe(heart, config, view)
-    sequence = Sequence(config, shown, plane, realism.random)
-    scanner, acquire = sequence.scanner, sequence.acquisition(sequence.scatterers())
-    gain = clip_gain(config.probe, config.bmode, len(scanner.scan.angle), scanner.range, realism.random("dropout"))
-    compressed = partial(bmode_clip, scan=scanner.scan, range_=scanner.range, bmode=config.bmode, gain=gain)
-    lines = np.stack([scanner.beamform(acquire(frame)) for frame in (0, heart.es)])
     side = config.bmode.field_of_view_mm
-    return Pair(compressed(lines)[config.bmode.sizes[0]], (-side / 2, side / 2, side, 0))
+    frames = realism.our_clip(config, heart, view, (0, heart.es)).images
+    return Pair(frames, (-side / 2, side / 2, side, 0))
 
 
 def real() -> Pair:
@@ -89,16 +83,27 @@ def real() -> Pair:
     return Pair(frames, (left, left + REAL_MM * columns, upper + REAL_MM * rows, upper))
 
 
-def columns(group: Group) -> dict[str, Pair]:
+def real_mouse(folder: Path, side: float) -> Pair:
+    """The real mouse with its largest and smallest cavity, which fills a picture of a side, as its scale is unknown."""
+    clip = dict(realism.mouse_clips(folder))["segmentation"]
+    area = clip.cavity.sum(axis=(1, 2))
+    beat = slice(*falls(area)[:2])
+    moments = beat.start + np.array([area[beat].argmax(), area[beat].argmin()])
+    return Pair(clip.images[moments, LOGO:, LOGO:], (-side / 2, side / 2, side, 0))
+
+
+def columns(group: Group, mice: Path | None) -> dict[str, Pair]:
     """Ideal, realistic and, where there is one, real pictures of a group by their names."""
-    setting = {"geometry": {"preset": group.species, **ELEMENTS}, "loop": {"frames": FRAMES}}
+    setting = {"geometry": {"preset": group.species, **ELEMENTS}, "loop": {"frames": realism.FRAMES}}
     setting |= {"views": {"preset": "echo"}} if group.view == "four_chamber" else {}
     heart, found = None, {}
     for name, preset in (("Ideal", "none"), ("Realistic", group.species)):
         config = et.configure(**setting, realism={"preset": preset})
         heart = heart or et.beat(config, progress=False)
         found[name] = imaged(heart, config, group.view)
-    return found | ({"Real": real()} if group.species == "human" else {})
+    if group.species == "human":
+        return found | {"Real": real()}
+    return found | ({"Real": real_mouse(mice, group.side)} if mice else {})
 
 
 @style.styled
@@ -114,18 +119,27 @@ def draw(groups: dict[Group, dict[str, Pair]]) -> Figure:
                 axes.imshow(frame, cmap="gray", vmin=0, vmax=255, extent=pair.extent)
                 axes.set(xlim=(-group.side / 2, group.side / 2), ylim=(group.side, 0), xticks=[], yticks=[])
                 axes.set_facecolor("black")
-                axes.text(0.03, 0.97, moment, color="white", va="top", fontweight="bold", transform=axes.transAxes)
-        bar = round_length(group.side)
-        axes.plot(np.array([0.47, 0.47]) * group.side - [bar, 0], [0.95 * group.side] * 2, color="white", linewidth=2)
-        axes.text(0.47 * group.side, 0.935 * group.side, f"{bar:g} mm", color="white", ha="right")
+                label = axes.text(0.03, 0.97, moment, color="white", va="top", transform=axes.transAxes)
+                label.set(fontweight="bold", path_effects=[withStroke(linewidth=2.5, foreground="black")])
+            if name == "Realistic":
+                _bar(axes, group.side)
     return figure
+
+
+def _bar(axes: Axes, side: float) -> None:
+    """A bar of a round length at the lower right."""
+    bar = round_length(side)
+    axes.plot(np.array([0.47, 0.47]) * side - [bar, 0], [0.95 * side] * 2, color="white", linewidth=2)
+    axes.text(0.47 * side, 0.935 * side, f"{bar:g} mm", color="white", ha="right")
 
 
 def main() -> None:
     """Image the hearts and draw them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--mice", type=Path, help="real clips of mice")
     parser.add_argument("-o", "--output", type=Path, default=Path("docs/gallery"))
-    save(draw({group: columns(group) for group in GROUPS}), parser.parse_args().output / "realism.png")
+    given = parser.parse_args()
+    save(draw({group: columns(group, given.mice) for group in GROUPS}), given.output / "realism.png")
 
 
 if __name__ == "__main__":
