@@ -5,7 +5,7 @@
 
 The first solves those of `cases.draw.preset: hearts`, and those without disease. It prints a line a heart, of ten and
 three seconds of CPU time, and the sum of each species. The second solves healthy hearts and every preset of disease, in
-ten seconds, and four of them on a finer mesh, in forty. It adds them to results/presets.csv, of which it leaves out
+ten seconds, and on a finer mesh, in forty. It adds them to results/presets.csv, of which it leaves out
 what is there: the values that have bounds, in the units of their keys, and the extremes over segments and levels of the
 strain at end-systole. `tests/benchmark/test_presets.py` holds them to the bounds.
 """
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Iterable
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -42,8 +43,6 @@ PRESETS: dict[str, dict[str, Any]] = {
     "normal": {"activation": {"preset": "normal"}},
 }
 """Name -> section `pathology`: each of its presets, ages of infarcts and orders of activation."""
-ON_FINE = ("dcm", "hypertension", "fresh", "lbbb")
-"""Presets that are solved on the fine mesh too."""
 HEALTHY = {key: given for key, given in HEARTS.items() if "uniform" in given and not key.startswith("loop.")}
 
 
@@ -84,8 +83,7 @@ def preset_row(name: str, species: str, elements: str) -> dict[str, Any]:
 
 def hearts_of_table(every_species: Iterable[str]) -> list[tuple[str, str, str]]:
     """Species, preset and mesh of the hearts of the table, coarse ones first."""
-    wanted = [(COARSE, name) for name in PRESETS] + [(FINE, name) for name in ON_FINE]
-    return [(species, name, elements) for elements, name in wanted for species in every_species]
+    return [each[::-1] for each in product((COARSE, FINE), PRESETS, every_species)]
 
 
 def tabulate_presets(every_species: list[str]) -> None:

@@ -55,12 +55,8 @@ SIZE, BLACK = 256, 4
 NEXT_S, FIFTH_S, MEASURED = 0.04, 0.2, 24
 """Time to the next frame and to the fifth, of a human beat in 24 frames, s; and frames of a real clip in a mean."""
 MESH = {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2}
-OURS: dict[str, tuple[str, str, dict[str, Any]]] = {
-    "human": ("realistic_human", "four_chamber", {}),
-    "mouse": ("realistic", "mid", {}),
-    "mouse, linear array": ("realistic", "mid", {"probe.preset": "mouse_linear_30MHz"}),
-}
-"""Name of ours -> configuration, view, and keys that differ."""
+OURS = {"human": ("realistic_human", "four_chamber"), "mouse": ("realistic", "mid")}
+"""Species of ours -> configuration and view."""
 
 Masks = NDArray[np.bool_]
 Row = dict[str, float]
@@ -363,12 +359,11 @@ def random(name: str) -> np.random.Generator:
     return np.random.default_rng(np.frombuffer(sha256(name.encode()).digest(), np.uint32))
 
 
-def our_rows(name: str, cache: Path) -> Row:
+def our_rows(species: str, cache: Path) -> Row:
     """All rows of a clip of ours."""
-    file, view, keys = OURS[name]
+    file, view = OURS[species]
     mesh = {f"geometry.{key}": value for key, value in MESH.items()}
-    config = et.configure(HERE.parent / f"config/{file}.yaml", **nested(mesh | {"loop.frames": FRAMES} | keys))
-    species = config.geometry.preset
+    config = et.configure(HERE.parent / f"config/{file}.yaml", **nested(mesh | {"loop.frames": FRAMES}))
     clip = our_clip(config, solved(config, cache / f"{species}.npz"), view)
     return human_rows(clip) if species == "human" else mouse_rows(clip)
 
@@ -404,20 +399,18 @@ def report(results: dict[str, Any]) -> str:
         "",
         "Means over frames; grey levels are of 255. Each real clip is one value of a row. All sectors are scaled to a"
         " depth of 110 px. The wall is a ring round the cavity, whose masks in the clips of echonet/dynamic are those"
-        " of a network. What lies outside the range of the real clips is marked. `benchmarks/realism.py` says how.",
+        " of a network. `benchmarks/realism.py` says how.",
     ]
-    for title, real, ours in (("People", "people", ["human"]), ("Mice", "mice", [n for n in OURS if n != "human"])):
-        clips = results[real]
-        names = list(max(clips.values(), key=len))
-        rows = []
-        for row in names:
+    for real, ours in (("people", "human"), ("mice", "mouse")):
+        clips, rows = results[real], []
+        for row, value in results[ours].items():
             values = [each[row] for each in clips.values() if row in each]
-            low, high = min(values), max(values)
-            cells = [_shown(results[n][row]) + ("" if low <= results[n][row] <= high else " (outside)") for n in ours]
-            rows.append([row, f"{_shown(low)} to {_shown(high)}", _shown(float(np.median(values))), *cells])
-        lines += ["", f"## {title}", "", *table(["", f"{len(clips)} real clips", "median", *ours], rows), ""]
-        for column, n in enumerate(ours, 3):
-            lines.append(f"- {n}: {sum('outside' not in r[column] for r in rows)} of {len(rows)} rows within the range")
+            outside = "" if min(values) <= value <= max(values) else "outside"
+            limits = f"{_shown(min(values))} to {_shown(max(values))}"
+            rows.append([row, limits, _shown(float(np.median(values))), _shown(value), outside])
+        within = sum(not row[-1] for row in rows)
+        lines += ["", *table([real, f"{len(clips)} real clips", "median", f"our {ours}", ""], rows)]
+        lines += ["", f"Within the range: {within} of {len(rows)} rows."]
     share = f"{100 * drawn_share(results):.0f} % of {len(results['drawn'])}"
     lines += ["", f"Of clips with drawn `acoustics`, {share} have brightness and contrast of the real ones together."]
     return "\n".join([*lines, ""])

@@ -15,7 +15,7 @@ class ExactRecord:
     As `FullMatrix`; the record is so long that it does for all transmits.
     """
 
-    def __init__(self, probe, depth, latest, elevation=True):
+    def __init__(self, probe, depth, latest, elevation=True, harmonic=False):
         sampling, centre, bandwidth = probe.sampling_MHz * MHz, probe.frequency_MHz * MHz, probe.bandwidth
         self.samples, self.sampling = 2160, sampling
         self.centres = (np.arange(probe.elements) - (probe.elements - 1) / 2) * (probe.pitch_um * um)

@@ -116,7 +116,7 @@ def test_strain_and_its_scores_do_not_know_the_motion(twisting_heart, view):
     np.testing.assert_allclose(moved[:2], alone[:2], atol=1.01 * STRAIN)
     np.testing.assert_allclose(moved[2], alone[2], atol=2e-6)
     assert before["nrmse_all"] == after["nrmse_all"] == 0
-    assert np.nanmax(np.abs(after["true_segment_displacement"] - before["true_segment_displacement"])) > 1e-3
+    assert np.nanmax(np.abs(after["true_segment_displacement"] - before["true_segment_displacement"])) > 5e-4
     for name in (*STRAIN_SCORES, *STRAINS):
         np.testing.assert_allclose(after[name], before[name], atol=1e-4)
     if view == "mid":  # turned in the image by the whole rocking, at the middle of the beat

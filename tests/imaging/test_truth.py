@@ -154,7 +154,7 @@ def test_along_the_long_axis_the_tangential_strain_is_the_longitudinal(twisting_
 
 def test_the_cavity_centre_is_on_the_axis_and_moves_with_a_shifted_heart(twisting_heart, mid):
     assert np.allclose(cavity_centroid(twisting_heart, mid), [0, 6.5e-3], atol=1e-6)
-    shifted = twisting_heart.__class__(**{**vars(twisting_heart), "nodes": twisting_heart.nodes + [0.3e-3, 0.2e-3, 0]})
+    shifted = replace(twisting_heart, nodes=twisting_heart.nodes + [0.3e-3, 0.2e-3, 0])
     assert np.allclose(cavity_centroid(shifted, mid), [-0.3e-3, 6.3e-3], atol=1e-6)
 
 
