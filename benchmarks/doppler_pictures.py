@@ -73,8 +73,8 @@ class Imaged:
         sequence = Sequence(config, self._moving, self._plane, random)
         scanner = sequence.scanner
         lines = scanner.beamform(sequence.acquisition(sequence.scatterers())(frame))
-        gain = clip_gain(config.probe, config.bmode, len(lines), scanner.range, random("dropout"))
-        return bmode_clip(lines[None], scanner.scan, scanner.range, config.bmode, gain)[SIZE][0]
+        gain = clip_gain(config.probe, config.bmode, (config.loop.frames, len(lines)), scanner.range, random("dropout"))
+        return bmode_clip(lines[None], scanner.scan, scanner.range, config.bmode, gain[frame])[SIZE][0]
 
 
 def beaten(species: str) -> et.Heart:

@@ -106,7 +106,7 @@ def imaged(folder: Path, index: int, seed: int) -> Frame:
     scanner, acquire = sequence.scanner, sequence.acquisition(sequence.scatterers())
     lines = np.stack([scanner.beamform(acquire(frame)) for frame in shown])
     bmode = config.bmode.model_copy(update=MACHINE)
-    gain = clip_gain(config.probe, bmode, len(lines[0]), scanner.range, random("dropout"))
+    gain = clip_gain(config.probe, bmode, (CYCLE, lines.shape[1]), scanner.range, random("dropout"))[shown]
     image = bmode_clip(lines, scan=scanner.scan, range_=scanner.range, bmode=bmode, gain=gain)[IMAGED]
     centres = pixel_centres(config.bmode, IMAGED)
     tissue, labels = TissueImages(config, moving, plane, *centres), []

@@ -217,7 +217,7 @@ def test_echoxflow_is_the_bmode_before_scan_conversion(folder, rf):
     config = Repository(folder).case("heart").config
     clip = echoxflow.read(export(folder, "echoxflow", "heart", "mid"))
     range_, half = rf.range.values, float(rf.line_angle[-1])
-    gain = clip_gain(config.probe, config.bmode, rf.sizes["line"], range_, np.random.default_rng(0))
+    gain = clip_gain(config.probe, config.bmode, rf.lines.shape[:2], range_, np.random.default_rng(0))
     size = config.bmode.model_copy(update={"size_px": 512})
     bmode = largest_clip(rf.lines.values, Sector(rf.line_angle.values), range_, size, gain)
     axial, lateral = pixel_centres(size, 512)

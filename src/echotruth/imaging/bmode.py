@@ -88,11 +88,11 @@ def clip_gain(
 
     Returns
     -------
-    Shape (frames, lines, ranges), or (1, ranges) if no echoes drop out, 1, float32.
+    Shape (frames, lines, ranges), 1, float32; a view of one line if no echoes drop out.
     """
     gain, dropout = time_gain_compensation(probe, bmode, range_), bmode.dropout
     drops = dropout.loss_dB or dropout.edge_loss_dB
-    return gain * dropout_gain(dropout, shape, range_, random) if drops else gain[None]
+    return gain * dropout_gain(dropout, shape, range_, random) if drops else np.broadcast_to(gain, (*shape, len(gain)))
 
 
 def envelope(lines: np.ndarray, gain: np.ndarray | float = 1.0) -> np.ndarray:

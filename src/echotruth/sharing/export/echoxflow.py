@@ -53,9 +53,8 @@ def _levels(clip: ExportedClip, rf: xr.Dataset) -> NDArray[np.uint8]:
     """Grey levels (frame, range, line): those of the B-mode, without what it does to pixels."""
     config, lines = clip.case.config, rf.lines.values
     random = generator(clip.case, clip.view, "dropout")
-    gain = clip_gain(config.probe, config.bmode, lines.shape[1], rf.range.values, random)
-    envelopes = np.stack([envelope(frame, gain) for frame in lines])
-    levels = log_compress(envelopes, config.bmode.dynamic_range_dB, config.bmode.gain_dB)
+    gain = clip_gain(config.probe, config.bmode, lines.shape[:2], rf.range.values, random)
+    levels = log_compress(envelope(lines, gain), config.bmode.dynamic_range_dB, config.bmode.gain_dB)
     return eight_bit(levels, config.bmode).transpose(0, 2, 1)
 
 
