@@ -2,18 +2,22 @@
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.ndimage import map_coordinates
 
+from echotruth.cases import Case
+from echotruth.config.building import configure
 from echotruth.echo import echoxflow
 from echotruth.extras import installation
 from echotruth.imaging.beamforming.scan import Sector
 from echotruth.imaging.bmode import clip_gain, largest_clip, pixel_centres
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export import Export, ExportError
+from echotruth.sharing.export.echoxflow import _levels as beamspace_levels
 
 pytestmark = pytest.mark.slow
 
@@ -231,6 +235,18 @@ def test_echoxflow_is_the_bmode_before_scan_conversion(folder, rf):
         assert np.corrcoef(found, ours[inside])[0, 1] > 0.99
         assert abs(np.mean(found - ours[inside])) < 1  # the same level is white
     np.testing.assert_allclose(clip.time, times(folder), rtol=1e-6)
+
+
+def test_echoxflow_loses_the_echoes_that_drop_out(folder, rf):
+    """A loss at the edges darkens the outer lines against those in the middle."""
+    config, levels = Repository(folder).case("heart").config, []
+    for loss in (0.0, 60.0):
+        case = Case("heart", {}, configure(config, bmode={"dropout": {"edge_loss_dB": loss}}))
+        levels.append(beamspace_levels(SimpleNamespace(case=case, view="mid"), rf).astype(float))
+    lines = np.array([each.sum(axis=(0, 1)) for each in levels])
+    middle = lines.shape[1] // 2
+    whole, lost = lines[:, [0, -1]].sum(axis=1) / lines[:, middle - 1 : middle + 1].sum(axis=1)
+    assert lost < 0.8 * whole
 
 
 def test_echoxflow_is_read_by_the_published_loader(folder, rf, tmp_path):
