@@ -199,6 +199,8 @@ def violation(values: dict[str, float], bounds: Physiology) -> str:
             continue
         holds, rule = (le, "at most") if "_max" in bound.key else (ge, "at least")
         if not holds(values[bound.key], limit):
-            value = "not a number" if np.isnan(values[bound.key]) else f"{values[bound.key]:.3g}"
+            # As many digits as show that it does.
+            texts = (f"{values[bound.key]:.{digits}g}" for digits in (3, 6, 17))
+            value = next(text for text in texts if not holds(float(text), limit)).replace("nan", "not a number")
             return f"{bound.description} is {value} and must be {rule} {limit:g} (physiology.{bound.key})."
     return ""
