@@ -16,15 +16,16 @@ benchmark: .venv/ready  ## the suite and docs/benchmark.md; takes hours, and goe
 	for part in 1 2 3 4 5 6 7 8 9 10; do $(BIN)/python -m benchmarks.suite part $$part --jobs 2 || exit; done
 	$(BIN)/python -m benchmarks.suite page
 
-# Two workers, and the static checks beside them; the tests of a module stay on one worker, because they share expensive
+# Some workers, and the static checks beside them; the tests of a module stay on one worker, because they share expensive
 # fixtures.
+WORKERS := 2
 test: CHOICE = -m "not slow"
 test-all: CHOICE = $(INTEGRATION:%=--ignore=%)
 test test-all: .venv/ready
 	$(MAKE) -j 2 static pytest CHOICE='$(CHOICE)'
 
 pytest:
-	$(BIN)/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(CHOICE)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadscope --no-loadscope-reorder $(CHOICE)
 
 static:
 	$(BIN)/ruff check .
@@ -39,9 +40,9 @@ INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.p
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(INTEGRATION)
 
-# It finds in .venv what both need, and holds only the rest.
+# It finds in .venv what both need, pip too, and holds only the rest.
 .venv-integration/ready: .venv/ready integration.lock
-	$(BIN)/python -m venv --clear .venv-integration
+	$(BIN)/python -m venv --clear --without-pip .venv-integration
 	for packages in .venv/lib/python*/site-packages; do \
 		echo "$(CURDIR)/$$packages" > ".venv-integration$${packages#.venv}/shared.pth"; done
 	.venv-integration/bin/python -m pip install --quiet --no-compile --disable-pip-version-check --require-hashes --no-deps -r integration.lock

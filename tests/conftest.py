@@ -37,10 +37,11 @@ def pytest_terminal_summary(terminalreporter):
 
 
 LONGEST = (
-    *("test_site", "test_slurm", "test_states", "test_browser", "test_snakemake", "test_checks", "test_circulation"),
-    *("test_added_tracker", "test_examples", "test_notebook", "test_estimate", "test_full_matrix", "test_baselines"),
+    *("test_slurm", "test_baselines", "test_states", "test_checks", "test_browser", "test_snakemake"),
+    *("test_circulation", "test_notebooks", "test_added_tracker", "test_examples", "test_notebook", "test_estimate"),
+    *("test_peers", "test_site", "test_full_matrix"),
 )
-"""Modules that take half a minute and more, longest first."""
+"""Modules that take half a minute and more, longest first; the first two compile different functions."""
 
 
 def pytest_collection_modifyitems(items):

@@ -29,27 +29,6 @@ def is_refused(status, output, errors):
     return status != 0 and not output and errors.count("\n") == 1 and "Traceback" not in errors
 
 
-BAD = {
-    "fibres: {endo_deg: 95}": "fibres.endo_deg = 95",
-    "geometri: {}": "did you mean geometry?",
-    "a: [": "line 1",
-    "cases: {loop.frames: [10, 20]}": "loop.frames cannot be swept",
-    "cases: {fibres.endo_deg: [60, 95]}": "endo_deg = 95",
-    "cases: {seed: [1, 1]}": "list each value once",
-    "loop: {file: nowhere.csv}": "nowhere.csv",
-    "seed: 1\nseed: 2": "is given twice",
-    "3": "mapping",
-}
-
-
-@pytest.mark.parametrize("text", BAD, ids=lambda text: text.replace(" ", ""))
-def test_bad_configuration_is_refused_in_one_line(tmp_path, text):
-    (tmp_path / "bad.yaml").write_text(text)
-    status, output, errors = run_cli("check", "bad.yaml", cwd=tmp_path)
-    assert is_refused(status, output, errors), errors
-    assert "bad.yaml" in errors and BAD[text] in errors
-
-
 @pytest.mark.parametrize("command", ["cases", "run"])
 def test_other_commands_check_before_they_start(tmp_path, command):
     (tmp_path / "bad.yaml").write_text("geometri: {}")
@@ -65,20 +44,6 @@ def test_what_is_not_a_text_file_is_refused_in_one_line(tmp_path, name, content)
         (tmp_path / name).write_bytes(content)
     status, output, errors = run_cli("check", name, cwd=tmp_path)
     assert is_refused(status, output, errors) and name in errors, errors
-
-
-def test_evaluation_of_no_repository_is_refused_in_one_line(tmp_path):
-    status, output, errors = run_cli("evaluate", "out/demo", "--tracker", "mypackage:track", cwd=tmp_path)
-    assert is_refused(status, output, errors) and "out/demo: is not a repository" in errors
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.slow
-def test_run_makes_only_the_files_asked_for_and_listing_them_writes_nothing(tmp_path):
-    config = ROOT / "config/demo.yaml"
-    file = f"out/demo/demo.zarr/hearts/{expand(load(config), 'demo')[0].heart}/zarr.json"
-    status, output, _ = run_process("run", config, file, "-n", cwd=tmp_path)
-    assert status == 0 and "mechanics" in output and "phantom" not in output and not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

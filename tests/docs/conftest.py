@@ -4,6 +4,7 @@ import learning_repository
 import pytest
 from finished_repository import configured
 
+import echotruth as et
 from echotruth.config import Bmode, Geometry, Rf, Tracking, View
 
 
@@ -28,3 +29,18 @@ def demo(tmp_path_factory):
     ).model_copy(update={"views": planes})
     learning_repository.make(folder / "out/demo", config)
     return folder
+
+
+COARSE = {
+    "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
+    **{"loop": {"frames": 4}, "bmode": {"size_px": 128, "downsampling": (1,)}, "rf": {"lines": 24, "focal_zones": 1}},
+    "phantom": {"density_per_mm3": 300.0},
+}
+"""Heart and images that are made in seconds."""
+
+
+@pytest.fixture
+def coarse(monkeypatch):
+    """Hearts and images are as coarse as `COARSE`, whatever their configuration says."""
+    configure = et.configure
+    monkeypatch.setattr(et, "configure", lambda *given, **keys: configure(configure(*given, **keys), **COARSE))

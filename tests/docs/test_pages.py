@@ -3,7 +3,6 @@
 import json
 import re
 import shlex
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -51,23 +50,16 @@ def test_commands_are_found_on_the_pages():
 
 
 FIRST_PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/start/*.md"))]
-COARSE = {
-    "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
-    **{"loop": {"frames": 4}, "bmode": {"size_px": 128, "downsampling": [1]}, "rf": {"lines": 24, "focal_zones": 1}},
-    "phantom": {"density_per_mm3": 300.0},
-}
-"""Heart and images that are made in seconds."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", FIRST_PAGES, ids=lambda page: page.stem)
-def test_python_of_the_first_hour_runs_as_it_stands_in_a_folder_with_a_space(page, demo, monkeypatch):
-    """The heart of README.md is coarser, and `out/infarcts` is the sample."""
+def test_python_of_the_first_hour_runs_as_it_stands_in_a_folder_with_a_space(page, demo, coarse, monkeypatch):
+    """Hearts are coarser, and `out/infarcts` is the sample."""
     (demo / "out/infarcts").unlink(missing_ok=True)
     (demo / "out/infarcts").symlink_to(et.sample().folder)
     monkeypatch.chdir(demo)
     monkeypatch.setattr(plt, "show", plt.close)
-    monkeypatch.setattr(et, "configure", partial(et.configure, COARSE))
     names: dict[str, object] = {}
     for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
         if "echotruth.torch" not in block or find_spec("torch"):

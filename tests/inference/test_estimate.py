@@ -85,7 +85,7 @@ def test_contractility_of_segments_is_found_from_the_motion_of_a_heart_of_anothe
 
 @pytest.mark.slow
 def test_derivatives_are_those_of_what_the_model_shows(observed, tmp_path):
-    config, edv = model_config(observed, (12, 6, 1), tmp_path), "loop.edv_uL"
+    config, edv = model_config(observed, (6, 4, 1), tmp_path), "loop.edv_uL"
     free = [
         one for one in parameters(config, {}) if one.key in (edv, "mechanics.regional.stiffness.9", "fibres.epi_deg")
     ]

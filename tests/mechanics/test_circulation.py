@@ -73,6 +73,13 @@ def diseased(disease, species):
 
 
 @pytest.fixture(scope="module")
+def weak():
+    """Configuration and arrays."""
+    config = heart(contractility=0.6)
+    return config, beat(config)
+
+
+@pytest.fixture(scope="module")
 def healthy():
     return beat(heart(frames=40))
 
@@ -116,17 +123,18 @@ def test_heart_moves_as_in_the_measured_loop(healthy):
 
 
 @pytest.mark.slow
-def test_changed_hearts_change_as_in_life(healthy):
+def test_changed_hearts_change_as_in_life(healthy, weak):
     curves, fraction = healthy["mechanics"], measured_heart(healthy, heart(40))[0]["ejection_fraction"]
 
     # A failing heart is congested: it fills more at a higher pressure, and ejects less.
-    weak, found = measured(heart(contractility=0.6))
+    config, arrays = weak
+    failing, found = arrays["mechanics"], measured_heart(arrays, config)[0]
     assert found["ejection_fraction"] < fraction - 0.1
-    assert weak["volume"][0] > 1.1 * curves["volume"][0]
-    assert weak["pressure"][0] > 1.5 * curves["pressure"][0]
-    assert np.ptp(weak["volume"]) < np.ptp(curves["volume"])
-    assert weak["arterial_pressure"].mean() < curves["arterial_pressure"].mean()
-    np.testing.assert_allclose(weak["stiffness"], curves["stiffness"])
+    assert failing["volume"][0] > 1.1 * curves["volume"][0]
+    assert failing["pressure"][0] > 1.5 * curves["pressure"][0]
+    assert np.ptp(failing["volume"]) < np.ptp(curves["volume"])
+    assert failing["arterial_pressure"].mean() < curves["arterial_pressure"].mean()
+    np.testing.assert_allclose(failing["stiffness"], curves["stiffness"])
 
     loaded, found = measured(heart(resistance=1.5, baroreflex=False))
     assert found["ejection_fraction"] < fraction - 0.02
@@ -139,7 +147,7 @@ def test_changed_hearts_change_as_in_life(healthy):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("species", "disease"), [("mouse", "old"), ("rat", "dcm"), ("human", "lbbb")])
+@pytest.mark.parametrize(("species", "disease"), [("mouse", "old"), ("mouse", "lbbb"), ("human", "dcm")])
 def test_heart_is_within_the_bounds_of_its_diagnosis(species, disease):
     config, arrays, _, values = diseased(disease, species)
     assert violation(values, bounds_of(config)) == ""
@@ -253,9 +261,9 @@ def test_blood_is_kept_from_beat_to_beat(monkeypatch):
 
 
 @pytest.mark.slow
-def test_beat_that_no_way_leads_to_from_the_last_frame_begins_at_rest(monkeypatch):
-    config, advance, refused = heart(contractility=0.6), LoadStepper.advance, []
-    usual = beat(config)["mechanics"]["volume"]
+def test_beat_that_no_way_leads_to_from_the_last_frame_begins_at_rest(weak, monkeypatch):
+    config, advance, refused = weak[0], LoadStepper.advance, []
+    usual = weak[1]["mechanics"]["volume"]
 
     def advance_from_rest(stepper, load, unknown, *others):
         fills_again = unknown == "cavity_pressure" and stepper.circulation is None and stepper.load.time > 0

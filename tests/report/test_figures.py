@@ -44,7 +44,7 @@ def test_without_a_heart_a_sentence_stands_in_place_of_every_figure(tmp_path, th
 @pytest.mark.parametrize(("label", "hearts"), [("heart", 2), ("group", 1)])
 def test_hearts_of_the_leaderboard_are_told_apart_by_their_label_or_by_their_motion(tmp_path, label, hearts):
     """All of these cases move alike."""
-    table = f"case,seed,label.{label}\na,1,20240101\nb,2,20240102\nd,3,20240101\n"
+    table = f"case,seed,label.{label}\na,1,20240101\nb,2,20240102\n"
     config = configured(name="labelled", views=("mid",), cases=Cases(table=table))
     folder = finish(tmp_path / "labelled", config)
     found = Figures(Repository(folder), folder / "figures").standings

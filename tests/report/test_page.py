@@ -15,7 +15,7 @@ from reported_repository import report
 from shown_repository import SHIFT
 
 from echotruth.report import page, style
-from echotruth.report.figures import OF_HEARTS, OF_TRACKERS, Figures
+from echotruth.report.figures import OF_TRACKERS, Figures
 from echotruth.repository import metadata
 from echotruth.repository.reader import Repository
 
@@ -148,12 +148,12 @@ def test_page_of_a_repository_without_a_complete_heart_says_why(reported, tmp_pa
 
 @pytest.mark.slow
 def test_many_hearts_are_listed_with_their_number_and_one_view_is_enough(reported, tmp_path, monkeypatch):
-    """All figures are drawn; most are not written, which takes long, but another's are shown."""
+    """What depends on views and hearts is drawn; most is not written, which takes long, but another's are shown."""
     monkeypatch.setattr("echotruth.report.hearts.SHOWN", 1)
     views = {"long": SETTINGS["views"]["long"]}
     made = make(tmp_path / "known", SETTINGS | {"views": views, "cases": {"seed": [1, 2]}})
     figures = Figures(Repository(made.folder), shutil.copytree(reported.folder / "figures", made.folder / "figures"))
-    drawn = {name: getattr(figures, name)() for name in (*OF_HEARTS, "population", *OF_TRACKERS)}
+    drawn = {name: getattr(figures, name)() for name in ("views", "population", *OF_TRACKERS)}
     for name in ("population", "views"):
         style.save(drawn[name], figures.folder / name)
     elements = Elements(page.write(figures.repository).read_text(encoding="utf-8"))

@@ -9,8 +9,8 @@ import zarr
 tensorstore = pytest.importorskip("tensorstore", reason="needs the package tensorstore")
 
 
-def test_every_array_of_numbers_is_read_alike(finished):
-    about = {path.parent: json.loads(path.read_bytes()) for path in finished.glob("*.zarr/**/zarr.json")}
+def test_every_array_of_numbers_is_read_alike(textured):
+    about = {path.parent: json.loads(path.read_bytes()) for path in textured.glob("*.zarr/**/zarr.json")}
     arrays = [folder for folder, one in about.items() if one["node_type"] == "array" and one["data_type"] != "string"]
     assert len(arrays) > 100
     for folder in arrays:

@@ -166,16 +166,16 @@ def test_added_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_
 
 
 @pytest.mark.slow
-def test_thousands_of_cases_open_in_seconds(tmp_path):
-    begin(tmp_path / "small", configured(seeds=range(1, 4_001)))
+def test_a_thousand_cases_open_in_half_a_second(tmp_path):
+    begin(tmp_path / "small", configured(seeds=range(1, 1_001)))
     start = time.process_time()
     repository = Repository(tmp_path / "small")
     page = Page(repository, first(repository), "", Document())
     page.show()
-    page.inputs["case"].value = repository.present[3333]
+    page.inputs["case"].value = repository.present[833]
     page.show()
-    assert time.process_time() - start < 2
-    assert page.facts.text.startswith(repository.present[3333]) and len(page.inputs["case"].completions) == 4_000
+    assert time.process_time() - start < 0.5
+    assert page.facts.text.startswith(repository.present[833]) and len(page.inputs["case"].completions) == 1_000
 
 
 def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_shown(shown, tmp_path):

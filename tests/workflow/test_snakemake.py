@@ -73,12 +73,6 @@ def test_graph_of_rules_is_the_way_of_a_view_and_nothing_is_written(tmp_path):
     assert not workspace.out.exists()
 
 
-def test_wrong_configuration_is_told_in_one_sentence(tmp_path):
-    workspace = Workspace(tmp_path / "wrong", "name: tiny\nphantoms: {}\n")
-    output = workspace.snakemake("-n", status=1)
-    assert "did you mean phantom?" in output and "Traceback" not in output
-
-
 def parsed(code: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run the Python at the beginning of the Snakefile, up to where it reads the configuration, and then code."""
     text = (ROOT / "Snakefile").read_text()

@@ -95,7 +95,7 @@ def infer(
     >>> import echotruth as et
     >>> seen = et.observe(et.sample(), "bspline_dic", "infarct")
     >>> fixed = {"mechanics.regional.stiffness": None, "fibres.endo_deg": None, "fibres.epi_deg": None}
-    >>> found = et.infer(seen, fixed, mesh=(12, 6, 1))  # half a minute
+    >>> found = et.infer(seen, fixed, mesh=(6, 4, 1))  # ten seconds
     >>> muscle = found["mean"].sel(parameter=["contractility.8", "contractility.11"]).values
     >>> bool(muscle[0] < muscle[1])  # the infarct is in segments 7 and 8
     True

@@ -5,6 +5,7 @@ from shutil import copytree
 
 import pytest
 from described_repository import GIVEN, make_failed, make_finished
+from once import once
 
 from echotruth.repository.reader import Repository
 from echotruth.sharing.description import describe
@@ -13,7 +14,7 @@ from echotruth.sharing.description import describe
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> Path:
     """A finished repository; tests copy it before they change anything but its documents."""
-    return make_finished(tmp_path_factory.mktemp("finished") / "small")
+    return once(tmp_path_factory, "to_describe", lambda to: make_finished(to / "small")) / "small"
 
 
 @pytest.fixture(scope="session")
@@ -27,6 +28,4 @@ def described(finished, tmp_path_factory) -> Path:
 @pytest.fixture(scope="session")
 def failed(tmp_path_factory) -> Path:
     """A repository of which one heart failed, with its documents and nobody's name or licence."""
-    folder = make_failed(tmp_path_factory.mktemp("failed") / "small")
-    describe(Repository(folder))
-    return folder
+    return once(tmp_path_factory, "failed", lambda to: describe(Repository(make_failed(to / "small")))) / "small"
