@@ -244,9 +244,16 @@ def train(chosen, epochs=EPOCHS, seed=0):
     return network.eval()
 
 
-def write(network, path):
-    """Write the weights, in half precision, as `bspline_cnn` reads them."""
-    layers = network.layers
+def channel_range(chosen):
+    """Least and largest value of each channel in samples and their mirrors."""
+    given = batch(chosen)
+    values = [each["channels"].movedim(1, 0).flatten(1) for each in (given, mirrored(given))]
+    return torch.cat(values, 1).aminmax(dim=1)
+
+
+def write(network, chosen, path):
+    """Write the weights, and the range of what they learned from, in half precision, as `bspline_cnn` reads them."""
+    layers, (least, largest) = network.layers, channel_range(chosen)
     arrays = {
         "first": network.first.weight[:, :, 0, 0],
         "first_bias": network.first.bias,
@@ -254,6 +261,8 @@ def write(network, path):
         "biases": torch.stack([layer.bias for layer in layers]),
         "last": network.last.weight[:, :, 0, 0],
         "last_bias": network.last.bias,
+        "least": least,
+        "largest": largest,
     }
     np.savez_compressed(path, **{name: values.detach().numpy().astype(np.float16) for name, values in arrays.items()})
 
@@ -329,7 +338,7 @@ def main():
     chosen, held_out = (list(all_samples(part.index)) for part in parts.values())
     network = train(chosen)
     calibrate(network, held_out)
-    write(network, given.output)
+    write(network, chosen, given.output)
     clips = scores(network, held_out).groupby("name", sort=False)
     table = clips.mean().assign(clips=clips.size(), **clips[["error", "ratio", "strain_ratio"]].agg(gmean))
     print(table.round(2).to_string())

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from contracting_ring import CENTRE, FRAMES, SIDE
+from scipy.ndimage import gaussian_filter
 
 import echotruth as et
+from echotruth.tracking.plausibility import is_noise
 
 
 def notes(ring, frames=None, tracker="dis"):
@@ -25,14 +27,46 @@ def evenly(place):
     return -0.1 * place
 
 
-@pytest.mark.parametrize("smooth", [0, 2])
-def test_noise_is_not_taken_for_motion(ring, smooth):
-    from scipy.ndimage import gaussian_filter
+def noise(seed, smooth):
+    values = gaussian_filter(np.random.default_rng(seed).normal(size=(FRAMES, SIDE, SIDE)), (0, smooth, smooth))
+    return np.clip(128 + 45 * values / values.std(), 0, 255).astype(np.uint8)
 
-    noise = gaussian_filter(np.random.default_rng(0).normal(size=(FRAMES, SIDE, SIDE)), (0, smooth, smooth))
-    told = notes(ring, np.clip(128 + 45 * noise / noise.std(), 0, 255).astype(np.uint8))
-    assert "the quality at end-systole is 0." in told and "the motion is not found" in told
-    assert "beats" not in told
+
+@pytest.mark.parametrize("smooth", [0, 2])
+def test_noise_has_no_strain(ring, smooth):
+    clip = et.read_clip(noise(0, smooth), spacing_mm=0.04, frame_time_ms=10)
+    strain = et.speckle_tracking(clip, ring.wall(), "dis")
+    assert np.isnan(strain.attrs["gcs_percent"]) and np.isnan(strain["strain"]).all()
+    assert strain.attrs["notes"].startswith("consecutive frames have nothing in common in the wall, as in noise")
+    assert "beats" not in strain.attrs["notes"]
+
+
+def test_noise_is_told_from_a_ring_in_noise(ring):
+    mask = ring.wall().mask((SIDE, SIDE))
+    assert all(is_noise(noise(seed, smooth), mask) for seed in range(20) for smooth in (0, 1, 2))
+    assert not is_noise(np.clip(ring.frames + 2.0 * noise(0, 0), 0, 255), mask)
+
+
+def test_motion_that_the_tracker_is_not_sure_of_or_says_nothing_of_is_told(ring):
+    def sure(quality):
+        def track(frames, points, *arguments):
+            moved = moving(evenly)(frames, points, *arguments)
+            return moved, np.full(moved.shape[:2], quality)
+
+        return track
+
+    assert notes(ring, tracker=sure(0.26)) == ""
+    assert notes(ring, tracker=sure(0.1)) == (
+        "the quality at end-systole is 0.10, and below 0.25 in noise: the motion is not found"
+    )
+    assert notes(ring, tracker=sure(np.nan)) == (
+        "the tracker does not say how sure it is: nothing tells a motion that it has not found"
+    )
+
+
+def test_wall_that_hardly_moves_is_told(ring):
+    told = notes(ring, tracker=moving(lambda place: 0.01 * place))
+    assert told == "the wall moves by 2.1 % of its thickness at most, as if nothing moved: is it a heart?"
 
 
 def test_ring_in_noise_that_is_still_followed_is_not_doubted(ring):

@@ -84,7 +84,7 @@ def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_comput
     scores = names["scores"](network, found)
     assert scores["name"].tolist() == [one.name for one in found] and scores["ratio"].mean() < 0.9
     assert scores["stated"].mean() == pytest.approx(scores["right"].mean(), abs=15)
-    names["write"](network, tmp_path / "weights.npz")
+    names["write"](network, found, tmp_path / "weights.npz")
     read_again = read(tmp_path / "weights.npz", len(names["CHANNELS"]))
     correction, deviation = seen_twice(read_again, found[0].channels)
     expected, log_deviation = names["seen_twice"](network, names["batch"](found[:1]))

@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import echotruth as et
 from echotruth.config.tracking import BsplineCnn, BsplineDic
 from echotruth.tracking import TrackerFailed, track
 from echotruth.tracking.ray_network import DILATIONS, OUTPUTS, PHASES, read
@@ -49,6 +52,7 @@ def weights(path, **last_bias):
     shapes = {"first": (WIDTH, len(CHANNELS)), "first_bias": (WIDTH,), "layers": (layers, WIDTH, WIDTH, 3, 3)}
     shapes |= {"biases": (layers, WIDTH), "last": (OUTPUTS, WIDTH), "last_bias": (OUTPUTS,)}
     arrays = {name: np.zeros(shape, np.float32) for name, shape in shapes.items()}
+    arrays |= {"least": np.full(len(CHANNELS), -np.inf), "largest": np.full(len(CHANNELS), np.inf)}
     arrays["last_bias"][2 * DEPTHS :] = last_bias.get("log_deviation", 0.0)
     np.savez(path, **arrays)
     return str(path)
@@ -56,7 +60,7 @@ def weights(path, **last_bias):
 
 def features(frames, ring):
     mask, points = ring
-    return ray_features(TrackerInput(frames, points, mask, SPACING, np.arange(FRAMES) * 5e-3, 0), BsplineCnn())
+    return ray_features(TrackerInput(frames, points, mask, SPACING, np.arange(len(frames)) * 5e-3, 0), BsplineCnn())
 
 
 def test_network_that_adds_nothing_leaves_the_motion_of_bspline_dic(frames, ring, tmp_path):
@@ -115,7 +119,7 @@ def test_wall_without_a_cavity_is_told(frames):
 
 def test_two_frames_are_no_beat(frames, ring):
     mask, points = ring
-    with pytest.raises(TrackerFailed, match="needs 6 frames or more; the clip has 2"):
+    with pytest.raises(TrackerFailed, match="needs 6 frames or more; the clip has 2: take bspline_dic"):
         track(frames[[0, 3]], points, mask, SPACING, np.array([0, 15e-3]), 0, BsplineCnn())
 
 
@@ -151,3 +155,108 @@ def test_points_that_are_nowhere_are_lost(frames, ring):
 def test_file_of_weights_that_is_not_there_is_told(frames, ring):
     with pytest.raises(TrackerFailed, match=r"nowhere\.npz: holds no weights"):
         found(frames, ring, BsplineCnn(weights="nowhere.npz"))
+
+
+BEAT = 12
+
+
+def radius(place):
+    return np.hypot(*(place - MIDDLE).T)[:, None]
+
+
+def still(place, t):
+    return place
+
+
+def turning_by_layer(place, t):
+    """Layers turn by up to 15 degrees at the endocardium and not at all at the epicardium."""
+    angle = np.radians(15) * np.sin(np.pi * t / BEAT) ** 2 * np.clip((48 - radius(place)) / 26, 0, 1)
+    lateral, axial = (place - MIDDLE).T[..., None]
+    turned = lateral * np.cos(angle) - axial * np.sin(angle), lateral * np.sin(angle) + axial * np.cos(angle)
+    return MIDDLE + np.concatenate(turned, 1)
+
+
+def contracting(place, t):
+    return MIDDLE + (place - MIDDLE) * (1 - 0.15 * np.sin(np.pi * t / BEAT) ** 2)
+
+
+@pytest.fixture(scope="module")
+def beat(clip):
+    """Clip of a ring of scatterers, of which the motion is exact, in much weaker ones."""
+
+    def in_ring(place):
+        return np.abs(radius(place)[:, 0] - 35) < 13
+
+    return lambda motion, frames=BEAT: clip(motion, frames, SIZE, inside=in_ring)
+
+
+def tracked(frames, ring, settings):
+    mask, points = ring
+    return track(frames, points, mask, SPACING, np.arange(len(frames)) * 5e-3, 0, settings)
+
+
+def error(moved, motion, ring):
+    return np.sqrt(((moved[BEAT // 2] - motion(ring[1], BEAT // 2) + ring[1]) ** 2).mean())
+
+
+def test_still_wall_does_not_thicken(beat, ring):
+    moved, quality = tracked(beat(still), ring, BsplineCnn())
+    offset = ring[1] - MIDDLE
+    distance = np.hypot(*offset.T)
+    slope = np.polyfit(distance, (moved[BEAT // 2] * offset).sum(1) / distance, 1)[0]
+    assert abs(slope) < 0.015 and quality.min() > 0.9
+
+
+def test_scale_below_what_was_learned_counts_as_the_least(beat, ring):
+    """Without, the network takes a wall that stands still for a systole of which nothing was tracked."""
+    given, network = features(beat(still), ring)[0], read(WEIGHTS, len(CHANNELS))
+    free = replace(network, least=np.full_like(network.least, -np.inf))
+    clamped, unclamped = (np.abs(seen_twice(each, given.channels)[0]).max() for each in (network, free))
+    assert clamped < 0.4 * unclamped
+
+
+def test_layers_that_turn_against_one_another_are_left_as_they_are_tracked(beat, ring):
+    frames = beat(turning_by_layer)
+    network, plain = (
+        error(tracked(frames, ring, settings)[0], turning_by_layer, ring) for settings in (BsplineCnn(), BsplineDic())
+    )
+    assert network <= 1.1 * plain
+    uncorrected, _ = features(frames, ring)
+    correction, _ = seen_twice(read(WEIGHTS, len(CHANNELS)), uncorrected.channels)
+    assert uncorrected.scale * np.abs(correction).max() > 1, "the network alone would change it"
+
+
+def test_healthy_heart_keeps_the_correction():
+    hearts = et.sample()
+    stored = hearts.scores.query("case == 'healthy' and view == 'mid' and tracker == 'bspline_dic'")
+    found = et.evaluate(et.track(hearts.clip("healthy", "mid"), "bspline_cnn"), hearts.heart("healthy"))
+    assert found["nrmse_percent"] < 0.85 * stored["nrmse_percent"].item()
+
+
+@pytest.mark.parametrize(
+    ("frames", "reason"),
+    [
+        (range(BEAT // 2 + 1), "the clip is no closed cycle, which"),
+        ([*range(BEAT)] * 2, "the motion comes again after 12 frames, and the clip has 24, which"),
+        ([0, 0, 1, 0, 0, 0, 0], "the wall moves by less than 10 % of its thickness, which"),
+    ],
+)
+def test_clip_of_another_kind_than_it_has_learned_is_tracked_by_bspline_dic(beat, ring, frames, reason, caplog):
+    images = beat(contracting)[frames]
+    (moved, quality), (plain, its_quality) = (tracked(images, ring, each()) for each in (BsplineCnn, BsplineDic))
+    np.testing.assert_array_equal(moved, plain)
+    np.testing.assert_allclose(quality, its_quality, atol=0.1)
+    assert f"{reason} the network does not know: tracked by bspline_dic" in caplog.text
+
+
+def test_deviation_lies_between_those_of_network_and_bspline_dic(beat, ring, tmp_path, monkeypatch):
+    frames = beat(contracting)
+    _, plain = tracked(frames, ring, BsplineDic())
+    file, once = weights(tmp_path / "unsure.npz", log_deviation=0.0), features(frames, ring)
+    monkeypatch.setattr("echotruth.tracking.trackers.bspline_cnn.ray_features", lambda *_: once)
+    found = {}
+    for weight in (0.0, 0.5, 1.0):
+        monkeypatch.setattr("echotruth.tracking.trackers.bspline_cnn.CORRECTION_WEIGHTS", (weight,))
+        found[weight] = tracked(frames, ring, BsplineCnn(weights=file))[1][1:].mean()
+    assert found[0.0] == pytest.approx(plain[1:].mean(), abs=0.05)
+    assert found[1.0] < found[0.5] < found[0.0] - 0.1

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import echotruth as et
 from echotruth.config.tracking import BsplineDic, Dis, WindowDeformation
-from echotruth.tracking.plausibility import doubts, repeated, wall_thickness
+from echotruth.tracking.plausibility import UNRELATED, consecutive_correlation, doubts, repeated, wall_thickness
 
 FRAMES, SIZE = 8, 64
 
@@ -69,6 +70,13 @@ def test_lengths_of_a_human_heart_do_not_suit_a_mouse(frames, mask):
         "knots_mm = 4 suits a wall 8.5 mm thick, and this one has 0.85 mm"
         in told(frames, mask, BsplineDic(knots_mm=4))[0]
     )
+
+
+@pytest.mark.parametrize("case", ["healthy", "infarct"])
+@pytest.mark.parametrize("view", ["mid", "long_axis"])
+def test_no_heart_is_taken_for_noise(case, view):
+    clip = et.sample().clip(case, view).transpose("frame", "axial", "lateral", ...)
+    assert consecutive_correlation(clip["image"].values[::2], clip["mask"].values[0].astype(bool)) > 2 * UNRELATED
 
 
 def test_wall_is_as_thick_as_it_was_drawn(mask):

@@ -18,7 +18,8 @@ def network(seed=1):
         "last": (OUTPUTS, WIDTH),
         "last_bias": (OUTPUTS,),
     }
-    return {name: random.normal(0, 0.2, shape).astype(np.float32) for name, shape in shapes.items()}
+    arrays = {name: random.normal(0, 0.2, shape).astype(np.float32) for name, shape in shapes.items()}
+    return arrays | {"least": np.full(CHANNELS, -np.inf), "largest": np.full(CHANNELS, np.inf)}
 
 
 def channels(seed=2):
@@ -36,6 +37,16 @@ def test_network_knows_no_first_ray():
     turned = [np.roll(each, 5, 2) for each in made(given)]
     for one, other in zip(made(np.roll(given, 5, 2)), turned, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-5)
+
+
+def test_channels_beyond_what_was_learned_count_as_its_least_and_largest():
+    given = channels()
+    least, largest = np.float32([[-0.5], [0.7]]).repeat(CHANNELS, 1)
+    made = RayNetwork(**network() | {"least": least, "largest": largest})
+    for one, other in zip(
+        made(given), RayNetwork(**network())(np.clip(given, np.float32(-0.5), np.float32(0.7))), strict=True
+    ):
+        np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-4)  # in single precision
 
 
 def test_every_output_sees_the_whole_wall_and_cycle():

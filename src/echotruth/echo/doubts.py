@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from echotruth.aha import SEGMENT_NAMES
 from echotruth.arrays import Floats
-from echotruth.evaluation import statistics
+from echotruth.tracking.periodicity import repetition, rms_length
 from echotruth.tracking.plausibility import REFERENCE_WALL_MM
 
 LARGEST_FIRST, LARGEST_DRIFT, LEAST_COVERAGE = 1.1, 20.0, 90.0
@@ -15,6 +15,10 @@ end-systole, %: beyond these a note says so. An infarct that bulges before the v
 large, in truth, in the short axis of the sample."""
 LEAST_DRIFT_PX = 1 / 3
 """RMS displacement in the last frame below which there is no note of drift."""
+
+LEAST_MOTION = 0.1
+"""RMS displacement of the frame in which it is largest, over the thickness of the wall, below which a note says so; it
+is 0.33 or more in hearts (docs/tracking.md)."""
 
 LEAST_QUALITY = 0.25
 """Mean quality at end-systole below which a note says so (docs/own_echo.md has that of noise and of clips)."""
@@ -27,11 +31,6 @@ LARGEST_STEP = 0.25
 
 UNEVEN, LEAST_DIFFERENCE = 3.0, 0.05
 """Ratio of the strains of two segments from which a note says so, if they differ by this much at least."""
-
-REPEATS, APART, ALIKE = 0.6, 0.5, 0.2
-"""Longest part of a clip after which its motion is sought again; and mean squared difference of displacements so much
-later, over that of unrelated ones, which must first be larger and then smaller if it comes again. Of one beat the first
-two fifths, in which the heart contracts, are compared with the last then, in which it rests."""
 
 LINE_STEPS = 200
 """Pieces of a line between which crossings are sought."""
@@ -64,6 +63,7 @@ def doubts(strain: xr.Dataset, thickness: float) -> list[str]:
         _size(thickness, time),
         _beats(moved, time),
         _rate(moved, thickness),
+        _stillness(moved, thickness),
         _beginning(strain["cavity_area"].values),
         _drift(strain, moved),
         _estimates(strain),
@@ -71,11 +71,6 @@ def doubts(strain: xr.Dataset, thickness: float) -> list[str]:
         _segments(strain),
     )
     return [text for text in told if text]
-
-
-def rms_length(vectors: Floats) -> Floats:
-    """RMS length (frame,) of vectors (frame, point, plane)."""
-    return np.sqrt(statistics.mean((vectors**2).sum(-1)[..., None], np.ones((1, vectors.shape[1]), bool))[:, 0, 0])
 
 
 def _size(thickness: float, time: Floats) -> str:
@@ -92,17 +87,8 @@ def _size(thickness: float, time: Floats) -> str:
 
 def _beats(moved: Floats, time: Floats) -> str:
     """Of a motion that comes again."""
-    moved = moved[:, np.isfinite(moved).all(axis=(0, 2))]
-    total = 2 * np.mean(rms_length(moved - moved.mean(axis=0)) ** 2)
-    lags = range(1, int(REPEATS * len(moved)) + 1)
-    apart = np.array([np.mean(rms_length(moved[lag:] - moved[:-lag]) ** 2) for lag in lags]) / (total or np.nan)
-    if not (apart > APART).any():
+    if not (period := repetition(moved)):
         return ""
-    far = int(np.argmax(apart > APART))
-    period = far + int(np.argmin(apart[far:])) + 1
-    if apart[period - 1] > ALIKE:
-        return ""
-    period = far + int(np.argmax(apart[far:] <= 1.5 * apart[period - 1])) + 1
     return (
         f"the motion comes again after {1e3 * (time[period] - time[0]):.0f} ms, so that the clip holds "
         f"{len(moved) / period:.2g} beats: choose a cycle of {period} frames"
@@ -126,6 +112,14 @@ def _rate(moved: Floats, thickness: float) -> str:
     )
 
 
+def _stillness(moved: Floats, thickness: float) -> str:
+    """Of a wall that hardly moves."""
+    largest = np.nanmax(rms_length(moved), initial=0) / thickness
+    if not 0 < largest < LEAST_MOTION:
+        return ""
+    return f"the wall moves by {100 * largest:.2g} % of its thickness at most, as if nothing moved: is it a heart?"
+
+
 def _beginning(area: Floats) -> str:
     """Of a cavity, (frame,), that is largest elsewhere."""
     if not np.nanmax(area, initial=0) > LARGEST_FIRST * area[0]:
@@ -146,6 +140,8 @@ def _drift(strain: xr.Dataset, moved: Floats) -> str:
 def _estimates(strain: xr.Dataset) -> str:
     """Of points without an estimate at end-systole, or with a poor one."""
     quality = strain["quality"].values[strain.attrs["es_frame"]]
+    if not np.isfinite(strain["quality"]).any() and np.isfinite(strain["displacement"]).any():
+        return "the tracker does not say how sure it is: nothing tells a motion that it has not found"
     known = np.isfinite(strain["displacement"].values[strain.attrs["es_frame"]]).all(axis=-1)
     if (coverage := 100 * known.mean()) < LEAST_COVERAGE:
         return f"only {coverage:.0f} % of the points have an estimate at end-systole"

@@ -77,18 +77,18 @@ def summary(strain: xr.Dataset) -> dict[str, object]:
         source, view, tracker; `gcs_percent` and `gls_percent` of the middle line at end-systole, one of them NaN;
         `doubtful`, whether there are notes;
         `end_systole_ms`; `coverage_percent`, the share of points with an estimate there; `quality`, the mean of these
-        points; `drift_percent`; `notes`.
+        points, NaN of a tracker that states none; `drift_percent`; `notes`.
     """
     es, attributes = strain.attrs["es_frame"], strain.attrs
     quality = strain["quality"].values[es]
-    known = np.isfinite(quality)
+    known, stated = np.isfinite(strain["displacement"].values[es]).all(-1), np.isfinite(quality)
     return {
         **{name: attributes[name] for name in ("source", "view", "tracker")},
         **{name: attributes.get(name, np.nan) for name in ("gcs_percent", "gls_percent")},
         "doubtful": bool(attributes["notes"]),
         "end_systole_ms": 1e3 * attributes["end_systole"],
         "coverage_percent": 100 * float(known.mean()),
-        "quality": float(quality[known].mean()) if known.any() else np.nan,
+        "quality": float(quality[stated].mean()) if stated.any() else np.nan,
         "drift_percent": attributes["drift_percent"],
         "notes": str(attributes["notes"]).replace("\n", "; "),
     }
@@ -129,7 +129,9 @@ def _title(strain: xr.Dataset) -> str:
     row = summary(strain)
     where = f"at end-systole, {row['end_systole_ms']:.0f} ms"
     first = f"{Path(str(row['source'])).name}, {row['view']}: {headline(strain)} {where}"
-    rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {row['quality']:.2f} ({QUALITY})"
+    is_stated = bool(np.isfinite(strain["quality"].values[strain.attrs["es_frame"]]).any())
+    quality = f"{row['quality']:.2f} ({QUALITY})" if is_stated else "unknown"
+    rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {quality}"
     return f"{first}\n{row['tracker']}, {rest}"
 
 

@@ -11,7 +11,7 @@ from echotruth.aha import SEGMENT_NAMES
 from echotruth.arrays import Floats
 from echotruth.config.building import configure, tracker_section
 from echotruth.config.defaults import REFERENCE_FIELD_OF_VIEW_MM
-from echotruth.echo.doubts import doubts, rms_length
+from echotruth.echo.doubts import doubts
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import LAYERS, Wall
 from echotruth.echo.wall_file import part
@@ -21,6 +21,7 @@ from echotruth.evaluation.displacement_error import WallPoints
 from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.repository.schema import LABELS
 from echotruth.tracking import plausibility
+from echotruth.tracking.periodicity import rms_length
 from echotruth.tracking.plausibility import REFERENCE_WALL_MM
 from echotruth.tracking.tracker import track
 
@@ -61,7 +62,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
         it; `rotation` (frame,), rad; `cavity_area` (frame,), m2. Attributes: `es_frame`, the frame of the smallest
         cavity, and `end_systole`, s; `gcs_percent` or `gls_percent`, of the middle line at end-systole;
         `drift_percent`, the displacement left in the last frame over the largest; `notes`, what should make one doubt,
-        a line each; `tracker`, `view`. NaN where there is no estimate.
+        a line each; `tracker`, `view`. NaN where there is no estimate, as
+        everywhere in noise.
 
     Raises
     ------
@@ -98,6 +100,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     points = _points(mask, spacing, scale)
     settings = _settings(tracker, options, scale)
     displacement, quality = track(frames, points, mask, spacing, clip["time"].values, 0, settings)
+    if plausibility.is_noise(frames, mask):
+        displacement[:], quality[:] = np.nan, np.nan
     position, moved = points * spacing, displacement * spacing
     depth, normal = wall.depth(points)
     tissue = _tissue(wall, points, depth, position)

@@ -194,7 +194,8 @@ def _points(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
 
 
 def _tracking(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
-    if bool((np.isfinite(arrays["displacement"]).all(-1) != np.isfinite(arrays["quality"])).any()):
+    known, stated = np.isfinite(arrays["displacement"]).all(-1), np.isfinite(arrays["quality"])
+    if stated.any() and bool((known != stated).any()):  # a tracker may state none at all
         yield "quality", "is given where there is no displacement, or the reverse"
     for name, values in scores.unpacked(arrays["scores"], config).items():
         for problem in _in_range(values, RANGES[schema.SCORES[name].values]):

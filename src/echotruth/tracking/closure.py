@@ -19,6 +19,8 @@ which may be a scar that hardly moves."""
 OPEN_DISPLACEMENT = 0.5
 """Displacement that is left in the last frame, over the largest, above which a clip is open. In realistic and ideal
 hearts it is 0.45 at most over the whole cycle, and 0.85 at least over its first half (docs/tracking.md)."""
+SURELY_OPEN_DISPLACEMENT = 0.75
+"""The same above which there is no doubt: 232 whole cycles of the benchmark have 0.71 at most."""
 DOUBTFUL_VARIANCE = 1.5
 """Variance of the step from the last frame to the first over the largest of consecutive frames, above which an open
 clip, in which this step is a long one, is not followed backwards. Over the first half of a cycle it is above 1.5 in
@@ -52,6 +54,11 @@ class Closure:
         That speckle has changed does not make it open: the wall may have come back all the same.
         """
         return self.displacement > OPEN_DISPLACEMENT
+
+    @property
+    def is_surely_open(self) -> bool:
+        """Whether the clip is no closed cycle, beyond doubt."""
+        return self.displacement > SURELY_OPEN_DISPLACEMENT
 
     @property
     def is_followed(self) -> bool:

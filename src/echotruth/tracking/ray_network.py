@@ -36,6 +36,8 @@ class RayNetwork:
     layers, biases : ndarray of shapes (layer, width, width, 3, 3), (layer, width)
         Residual layers: to, from, phase, ray.
     last, last_bias : ndarray of shapes (OUTPUTS, width), (OUTPUTS,)
+    least, largest : ndarray of shape (channel,)
+        Range of each channel in what it has learned from, to which it is clamped; infinite where that is not known.
     """
 
     first: np.ndarray
@@ -44,6 +46,8 @@ class RayNetwork:
     biases: np.ndarray
     last: np.ndarray
     last_bias: np.ndarray
+    least: np.ndarray
+    largest: np.ndarray
 
     def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Correction of the displacement, and deviation of what is left.
@@ -59,6 +63,7 @@ class RayNetwork:
         deviation : ndarray of shape (PHASES, DEPTHS, RAYS)
             Standard deviation of the error along each axis, over the scale of the motion.
         """
+        channels = np.clip(channels, self.least[:, None, None], self.largest[:, None, None])
         values = _mixed(self.first, channels) + self.first_bias[:, None, None]
         for weights, bias, dilation in zip(self.layers, self.biases, DILATIONS, strict=True):
             values = values + np.maximum(_convolved(values, weights, dilation) + bias[:, None, None], 0)
@@ -96,6 +101,8 @@ def _check(network: RayNetwork, channels: int) -> None:
         "biases": (layers, width),
         "last": (OUTPUTS, width),
         "last_bias": (OUTPUTS,),
+        "least": (channels,),
+        "largest": (channels,),
     }
     for name, shape in expected.items():
         if (found := getattr(network, name).shape) != shape:

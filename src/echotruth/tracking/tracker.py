@@ -1,12 +1,13 @@
 """Call of any tracker."""
 
 import logging
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from echotruth.config.tracking import OUTSIDE
+from echotruth.config.tracking import OUTSIDE, BsplineCnn
 from echotruth.extras import explained
 from echotruth.section import Section
 from echotruth.tracking import trackers
@@ -53,7 +54,7 @@ def track(
     quality : ndarray of shape (frame, n)
         Probability that the displacement is right within 1/256 of the longer side of the image, as the tracker sees it
         (:mod:`echotruth.tracking.quality`; a tracker from outside may mean something else), from 0 to 1; NaN where
-        there is no displacement.
+        there is no displacement, and everywhere of a tracker that does not say how sure it is.
 
     Raises
     ------
@@ -95,13 +96,15 @@ def tracked_path(clip: TrackerInput, settings: Any) -> Path:
 
     If the tissue of the last frame cannot be followed to the first, it is tracked forwards only.
     """
-    if getattr(settings, "reference", None) == "bidirectional":
+    both_ways = getattr(settings, "reference", None) == "bidirectional"
+    if both_ways or isinstance(settings, BsplineCnn):
         from echotruth.tracking.closure import closure
 
         closing = closure(clip.frames, clip.mask)
-        if closing.is_open:
+        clip = replace(clip, is_closed=not closing.is_surely_open)
+        if both_ways and closing.is_open:
             ways = "both ways, as they are alike" if closing.is_followed else "forwards only"
             logging.getLogger("echotruth").warning(f"the clip is no closed cycle ({closing}): tracked {ways}")
-        if not closing.is_followed:
+        if both_ways and not closing.is_followed:
             settings = settings.model_copy(update={"reference": "previous"})
     return trackers.function(settings.method)(clip, settings)

@@ -7,7 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class TrackerInput:
-    """Arguments of :func:`echotruth.tracking.tracker.track`, which documents them.
+    """Arguments of :func:`echotruth.tracking.tracker.track`, which documents them, and whether the cycle may be closed.
 
     Raises
     ------
@@ -21,6 +21,7 @@ class TrackerInput:
     spacing: float
     frame_time: np.ndarray
     seed: int
+    is_closed: bool = True
 
     def __post_init__(self) -> None:
         frames, times = self.frames, self.frame_time

@@ -5,18 +5,28 @@ network is given the displacement, how far both ways are apart and how well imag
 that follows each point: where a border of the wall is lost, it changes. It gives what has to be added and how far the
 sum is still off (:mod:`echotruth.tracking.ray_network`). Between the points, and between phases of the cycle, the
 correction is interpolated linearly.
+
+It knows whole beats of hearts alone. So the images choose the weight of its correction, one a clip: that with which
+they are most alike along the motion (:mod:`echotruth.tracking.similarity`), with a small bonus, since `bspline_dic` is
+fitted to these very images, and the true motion is a little less like them. A clip that is open, of several beats or of
+a wall that does not move has no correction at all.
 """
 
+import logging
 from dataclasses import dataclass, fields, replace
 from pathlib import Path as File
 
 import numpy as np
 
-from echotruth.config.tracking import BsplineCnn
+from echotruth.config.tracking import BsplineCnn, BsplineDic
 from echotruth.tracking.accumulation import Path
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import rms
+from echotruth.tracking.periodicity import repetition
+from echotruth.tracking.quality import IMAGE_FRACTION, error_model, squares
 from echotruth.tracking.ray_network import PHASES, RayNetwork, read
+from echotruth.tracking.similarity import even_contrast, similarity
+from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker_input import TrackerInput
 from echotruth.tracking.trackers.bspline_dic import BothWays, follow, gaussian, lost
 from echotruth.tracking.wall_rays import ANGLES, DEPTHS, DIRECTIONS, RAYS, WallRays, wall_rays
@@ -50,6 +60,11 @@ ODD = [number for number, name in enumerate(CHANNELS) if name.startswith(("acros
 """Channels that change their sign in a mirror, left to right."""
 MIRRORED = (RAYS // 2 - np.arange(RAYS)) % RAYS
 """Ray that each is in the mirror: the one at an angle a is at pi - a."""
+CORRECTION_WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Weights of the correction that are tried."""
+BONUS = 0.04
+"""What the similarity of images along the whole correction may fall short of that along the motion of `bspline_dic`;
+docs/tracking.md says on which clips it was chosen."""
 LEAST_FRAMES = 6
 """Frames of a beat at least, of which 24 phases can be distinguished."""
 
@@ -74,9 +89,13 @@ class RayFeatures:
     rays: WallRays
     scale: float
 
+    def places(self) -> np.ndarray:
+        """Where `bspline_dic` has the points of the rays that cross the wall, (frame, DEPTHS, crossing ray, 2), px."""
+        return (self.rays.points + self.rays.in_image(self.displacement))[:, :, self.rays.crosses]
+
 
 def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
-    """Path of the points of a clip; its deviation is what the network says.
+    """Path of the points of a clip; its deviation is what the network says and :func:`deviation`, by their weights.
 
     Raises
     ------
@@ -86,18 +105,56 @@ def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
     frames = len(clip.frames)
     if frames < LEAST_FRAMES:
         raise ValueError(
-            f"A network that knows whole beats needs {LEAST_FRAMES} frames or more; the clip has {frames}."
+            f"bspline_cnn knows whole beats and needs {LEAST_FRAMES} frames or more; the clip has {frames}: take "
+            "bspline_dic."
         )
     if not clip.mask.any():
         nothing = lost(clip)
         return replace(nothing, deviation=nothing.variance)
     features, path = ray_features(clip, settings)
     rays, network = features.rays, read(settings.weights or WEIGHTS, len(CHANNELS))
-    correction, deviation = seen_twice(network, features.channels)
-    values = features.scale * np.concatenate([rays.in_image(correction), deviation[..., None]], -1)
+    if reason := unknown_motion(clip, features):
+        logging.getLogger("echotruth").warning(f"{reason}, which the network does not know: tracked by bspline_dic")
+        return replace(path, deviation=deviation(clip, path))
+    correction, stated = seen_twice(network, features.channels)
+    values = features.scale * np.concatenate([rays.in_image(correction), stated[..., None]], -1)
+    step = over_frames(values[..., :2], frames)[:, :, rays.crosses]
+    weight = correction_weight(clip, features, step)
     at_points = rays.interpolate(np.moveaxis(values, 0, 2), clip.points)
     found = over_frames(np.moveaxis(at_points, 1, 0), frames)
-    return replace(path, displacement=path.displacement + found[..., :2], deviation=found[..., 2])
+    variance = weight * found[..., 2] ** 2 + (1 - weight) * deviation(clip, path) ** 2
+    return replace(path, displacement=path.displacement + weight * found[..., :2], deviation=np.sqrt(variance))
+
+
+def unknown_motion(clip: TrackerInput, features: RayFeatures) -> str:
+    """Why a clip is none of those that the network knows, the beginning of a sentence; empty if it may be one."""
+    if not clip.is_closed:
+        return "the clip is no closed cycle"
+    if features.scale <= LEAST_SCALE * features.rays.thickness:
+        return f"the wall moves by less than {100 * LEAST_SCALE:.0f} % of its thickness"
+    if period := repetition(features.places().reshape(len(clip.frames), -1, 2)):
+        return f"the motion comes again after {period} frames, and the clip has {len(clip.frames)}"
+    return ""
+
+
+def correction_weight(clip: TrackerInput, features: RayFeatures, step: np.ndarray) -> float:
+    """Weight of `CORRECTION_WEIGHTS` with which images are most alike along the motion, `BONUS` times the weight added.
+
+    `step` (frame, DEPTHS, crossing ray, 2) is the correction at :meth:`RayFeatures.places`, px.
+    """
+    images, places = even_contrast(clip.frames, features.rays.thickness), features.places()
+
+    def likeness(weight: float) -> float:
+        moved = places + weight * step
+        return similarity(images, moved.reshape(len(moved), -1, 2)) + BONUS * weight
+
+    return max(CORRECTION_WEIGHTS, key=likeness)
+
+
+def deviation(clip: TrackerInput, path: Path) -> np.ndarray:
+    """Standard deviation (frame, n) of the error of `bspline_dic` along each axis, px, as its quality has it."""
+    terms = squares(path, speckle_length(clip.frames[0], clip.mask), clip.shape)
+    return np.sqrt(error_model(BsplineDic()).variance(terms)) * IMAGE_FRACTION * max(clip.shape)
 
 
 def seen_twice(network: RayNetwork, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

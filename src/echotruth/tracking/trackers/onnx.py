@@ -26,7 +26,10 @@ LARGEST_START = 1 / 16
 
 
 def track(clip: TrackerInput, settings: Onnx) -> tuple[Floats, Floats]:
-    """Run a model on a clip: displacement and quality, as :func:`echotruth.tracking.tracker.track` returns them."""
+    """Run a model on a clip: displacement and quality, as :func:`echotruth.tracking.tracker.track` returns them.
+
+    The quality is the visibility, and NaN of a model that gives none.
+    """
     model = Model(settings)
     side = np.array([model.sizes["W"], model.sizes["H"]])
     images = (Image.fromarray(frame) for frame in np.nan_to_num(grey_levels(clip.frames)))
@@ -95,7 +98,7 @@ class Model:
         self.sizes = {"H": SIDE, "W": SIDE} | self.sizes
 
     def __call__(self, video: Floats, points: Floats) -> tuple[Floats, Floats]:
-        """Tracks (T, N, 2) and visibility (T, N) of points (N, 2) of the first frame of a video (T, H, W)."""
+        """Tracks (T, N, 2) and visibility (T, N), or NaN, of points (N, 2) of the first frame of a video (T, H, W)."""
         is_normalised, side = self.signature.unit == "normalised", np.array(video.shape[:0:-1], float)
         turned = slice(None, None, -1 if self.signature.coordinates == "row_column" else 1)
         places = ((points + 0.5) / side if is_normalised else points)[:, turned]
@@ -111,7 +114,7 @@ class Model:
         if (start := np.median(np.hypot(*(tracks[0] - points).T))) > LARGEST_START * side.max():
             remedy = f"give the tracks, coordinates and unit in {self.beside}"
             raise TrackerFailed(f"{self.path}: {self.outputs[0]} begins {start:.0f} px from the points: {remedy}")
-        visible = found[1] if found[1:] else np.ones(shape[:-1])
+        visible = found[1] if found[1:] else np.full(shape[:-1], np.nan)
         if visible.shape not in (shape[:-1], (*shape[:-1], 1)) or (np.abs(visible - 0.5) > 0.5).any():
             told = f"has the shape {visible.shape}, and is {visible.min():.3g} to {visible.max():.3g}"
             remedy = f"a visibility has the shape {shape[:-1]}, and is 0 to 1"
