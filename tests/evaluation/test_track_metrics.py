@@ -152,3 +152,10 @@ def test_points_without_an_estimate_have_quality_zero_and_the_surest_are_in_the_
     found = curve(table.assign(size_px=512, tracker="a")).set_index("quality_low")
     assert found.loc[0.9, "observed_percent"] == 50 and found.loc[0.9, "stated_percent"] == pytest.approx(97.5)
     assert math.isnan(found.loc[0.5, "observed_percent"])
+
+
+def test_tracker_that_states_no_quality_is_neither_right_nor_wrong_in_it_and_one_that_failed_is_sure_of_nothing():
+    unknown, right = np.full((FRAMES, POINTS), np.nan), np.arange(FRAMES * POINTS).reshape(FRAMES, POINTS) % 2 == 0
+    assert all(np.isnan(value) for value in summary(unknown, right).values())
+    assert sum(step["count"] for step in counts(unknown, right)) == 0
+    assert summary(unknown, np.zeros_like(right))["quality_percent"] == 0

@@ -112,6 +112,7 @@ def test_pixel_outside_the_wall_has_no_motion(heart, name):
         ("physiology", "twist_ivc", ()),  # a heart without isovolumic contraction
         ("mechanics", "pressure_target", (1,)),  # a loop that prescribes volume alone
         ("mechanics", "pressure", (1,)),  # a prescribed motion
+        ("tracking/one", "quality", ()),  # a tracker that does not say how sure it is
         ("tracking/one", "segment_nrmse", (0, 0, 0)),  # a segment that the view does not show
     ],
 )

@@ -18,7 +18,7 @@ LEAST_DRIFT_PX = 1 / 3
 
 LEAST_MOTION = 0.1
 """RMS displacement of the frame in which it is largest, over the thickness of the wall, below which a note says so; it
-is 0.33 or more in hearts (docs/tracking.md)."""
+is a third and more in hearts."""
 
 LEAST_QUALITY = 0.25
 """Mean quality at end-systole below which a note says so (docs/own_echo.md has that of noise and of clips)."""
