@@ -187,10 +187,10 @@ def _case(row: Mapping[str, Any], acoustics: str, motion: Keys, trackers: dict[s
     random = Random(f"{SEED} {row['heart']} images")
     keys = motion | {"name": name, "seed": random.randrange(1, 10**6)} | drawn(POSE, random)
     keys["realism.preset"] = row["species"] if acoustics == "realistic" else "none"
-    config = _configured(row["species"], keys, trackers)
+    config = configured(row["species"], keys, trackers)
     if acoustics == "realistic":
         keys |= {key: round(value_of(config, key) + more, 4) for key, more in drawn(LOOK, random).items()}
-        config = _configured(row["species"], keys | _condition(row["species"], condition, random), trackers)
+        config = configured(row["species"], keys | _condition(row["species"], condition, random), trackers)
     (case,) = et.expand(config)
     disease = "healthy" if row["group"] == "healthy" else "diseased"
     sorts = {key: row[key] for key in ("part", "split", "species", "heart", "group")}
@@ -207,7 +207,8 @@ def _condition(species: str, condition: str, random: Random) -> Keys:
     return {"tracking.frame_step": 2} if condition == "low_rate" else {}
 
 
-def _configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None) -> et.Config:
+def configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None) -> et.Config:
+    """Configuration of a clip: the settings of every case, and keys; trackers are those of the suite by default."""
     if trackers is None:
         corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
         affine = TRACKERS["affine_dic"] | {"options": _scaled(species, {"subset_mm": SUBSET_MM})}
@@ -294,7 +295,7 @@ def usable_heart(row: Mapping[str, Any]) -> tuple[int, Heart]:
     """
     reasons = []
     for attempt in range(1, ATTEMPTS + 1):
-        config = _configured(row["species"], motion_keys(row, attempt))
+        config = configured(row["species"], motion_keys(row, attempt))
         try:
             arrays = simulate(config)
             arrays["physiology"], bounded = measured_heart(arrays, config)

@@ -1,0 +1,67 @@
+"""The motions of benchmarks/outside.py, the ring that is tracked there, and the page."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from benchmarks import outside
+
+RADIUS = np.linspace(1.0, 1.6, 40)
+AROUND = 2 * np.pi * np.arange(90) / 90
+WALL = outside.Wall(np.float64(1.0), np.float64(1.6))
+
+
+def moved(motion):
+    """Points (radius, angle, 2) of a wall at end-systole, and where they were."""
+    radius, angle = np.meshgrid(RADIUS, AROUND, indexing="ij")
+    nodes = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * radius], -1)
+    shift = outside.displacement(nodes.reshape(-1, 3), WALL, outside.MOTIONS[motion], 1, np.ones(1))[0]
+    return (nodes + shift.reshape(nodes.shape))[..., :2], nodes[..., :2]
+
+
+def area(place):
+    """Area between the first and the last ring of points."""
+    x, y = np.moveaxis(place, -1, 0)
+    inner, outer = (x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(1)[[0, -1]] / 2
+    return outer - inner
+
+
+@pytest.mark.parametrize("motion", ["still", "rotation", "twist by layer", "contraction", "dilation"])
+def test_area_of_the_wall_is_kept(motion):
+    now, before = moved(motion)
+    assert area(now) == pytest.approx(area(before), rel=1e-3)
+
+
+@pytest.mark.parametrize(("motion", "sign"), [("contraction", 1), ("dilation", -1), ("shrinking", -1), ("still", 0)])
+def test_sign_of_thickening(motion, sign):
+    now, before = moved(motion)
+    thicker = np.ptp(np.linalg.norm(now, axis=-1), axis=0) - np.ptp(np.linalg.norm(before, axis=-1), axis=0)
+    assert np.all(np.sign(np.round(thicker, 9)) == sign)
+
+
+def test_sector_does_not_move_or_moves_outwards():
+    for motion, sign in (("akinetic sector", 0), ("bulging sector", 1)):
+        now, before = moved(motion)
+        shift = np.round(np.linalg.norm(now[:, 0], axis=-1) - np.linalg.norm(before[:, 0], axis=-1), 9)
+        assert np.all(np.sign(shift) == sign)
+
+
+def test_turned_ring_has_no_strain_and_is_found_where_it_was():
+    centre, turn = np.array([120.0, 130.0]), np.radians(8)
+    clip, operator = outside.ring(np.zeros((3, 251, 251), np.uint8), centre, outside.WALL)
+    offset = (clip.points - centre) * outside.STEP
+    back = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    strain = operator.strain((offset @ back.T - offset)[None])
+    assert len(clip.frames) == 4
+    assert np.nanmax(np.abs(strain)) < 1e-9
+    stretched = operator.strain(0.1 * offset[None])[0]
+    assert np.nanmean(stretched, 0) == pytest.approx([0.105, 0.105, 0], abs=1e-6)
+
+
+def test_page_has_the_ratio_to_the_parent():
+    row = {"motion_px": 3.0, "radial_strain_percent": 4.0, "true_radial_strain_percent": 1.0}
+    row |= {"images": "mouse", "motion": "still", "speckle": 1, "stated_percent": 70.0, "right_percent": 60.0}
+    rows = [row | {"tracker": name, "error_px": error} for name, error in (("bspline_dic", 0.5), ("dis", 0.75))]
+    page = outside.page(pd.DataFrame(rows))
+    assert "| still | 3.0 | 0.50 | 1.50 |" in page
+    assert "+3.0 (70/60)" in page
