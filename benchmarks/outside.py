@@ -3,14 +3,13 @@
     python -m benchmarks.outside phantoms --jobs 2        # half an hour; goes on where it was stopped
     python -m benchmarks.outside pymust                   # needs PyMUST
     python -m benchmarks.outside disk PWI_disk.mat        # needs PyMUST, of whose examples the file is
-    python -m benchmarks.outside page
 
 Phantoms are walls as wide as the left ventricle of their species, in the look of its preset; each motion is drawn
 twice, in another speckle. Images of PyMUST show the same walls, by a probe, a beamformer and a grey map of its own. The
 disk turned in water before a linear array (https://github.com/creatis-ULTIM/PyMUST, examples/rotatingDisk_real.ipynb):
 its rate is that of the Doppler velocity, which grows across the beam by it, its axis where frames turned back by it are
 most alike, and a ring of it is tracked there and back.
-Rows are added to results/outside.csv as they are made, and the page is results/outside.md.
+Rows are added to results/outside.csv as they are made; the page of the suite has them.
 """
 
 from __future__ import annotations
@@ -33,7 +32,6 @@ from threadpoolctl import threadpool_limits
 
 import echotruth as et
 from benchmarks.parallel import in_processes
-from benchmarks.report import table as markdown
 from benchmarks.suite.hearts import configured
 from benchmarks.suite.scores import view_clips
 from echotruth.evaluation.clip import Clip
@@ -78,18 +76,7 @@ WALL, POINTS, STEPS = (4e-3, 9e-3), 4, 2
 """Inner and outer radius of the ring that is tracked, m, step of the points, px, and of the frames of the disk."""
 FRAMES, DENSITY = 12, 6e7
 """Frames of a simulated ring to end-systole, and its scatterers, 1/m^2."""
-PARENT, CLIP = "bspline_dic", ("images", "motion", "speckle")
-REMARKS = (
-    "RMS length of the true motion and error of `bspline_dic` at end-systole, px of 256, and the errors of others",
-    "over its. In the second table the mean radial strain of the wall at end-systole, tracked less true, in points;",
-    "and the share of the points that a tracker states to be right / that are right, %.",
-)
-TITLES = {
-    "mouse": "Mice, realistic look",
-    "human": "People, realistic look",
-    "PyMUST": "Rings in water, images of PyMUST",
-    "disk": "A disk that turned, there and back",
-}
+CLIP = ("images", "motion", "speckle")
 
 
 def inflated(wall: Wall, radius: Floats, change: float | Floats) -> Floats:
@@ -338,31 +325,6 @@ def missing(named: Iterable[tuple[str, str, int]]) -> list[tuple[str, str, int]]
     return [each for each in named if each not in there]
 
 
-def page(table: pd.DataFrame) -> str:
-    """The page."""
-    lines = ["# Trackers on motions that no heart makes", "", *REMARKS, ""]
-    means = table.groupby(["images", "motion", "tracker"], sort=False).mean(numeric_only=True)
-    for images in dict.fromkeys(table["images"]):
-        of_images = means.loc[images]
-        names = list(dict.fromkeys(of_images.index.get_level_values("tracker")))
-        rows = [_row(motion, of_images.loc[motion], names) for motion in dict.fromkeys(of_images.index.droplevel(1))]
-        head = ["motion", "true, px", f"`{PARENT}`, px", *(name for name in names if name != PARENT)]
-        errors, thickening = zip(*rows, strict=True)
-        lines += [f"## {TITLES[images]}", "", *markdown(head, list(errors)), ""]
-        lines += [*markdown(["motion", "true E_RR, %", *names], list(thickening)), ""]
-    return "\n".join([*lines, "`benchmarks/outside.py` says how.", ""])
-
-
-def _row(motion: str, found: pd.DataFrame, names: list[str]) -> tuple[list[str], list[str]]:
-    """Cells of both tables of a motion."""
-    error, true = found["error_px"], found["true_radial_strain_percent"]
-    ratios = [f"{error[name] / error[PARENT]:.2f}" for name in names if name != PARENT]
-    bias, sure = found["radial_strain_percent"] - true, found[["stated_percent", "right_percent"]]
-    cells = [f"{bias[name]:+.1f} ({sure.loc[name].iloc[0]:.0f}/{sure.loc[name].iloc[1]:.0f})" for name in names]
-    moved = f"{found['motion_px'].iloc[0]:.1f}"
-    return [motion, moved, f"{error[PARENT]:.2f}", *ratios], [motion, f"{true.iloc[0]:.1f}", *cells]
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
@@ -370,7 +332,6 @@ def main() -> None:
     phantoms.add_argument("--jobs", type=int, default=1)
     for name in ("pymust", "disk"):
         commands.add_parser(name).add_argument("file", type=Path)
-    commands.add_parser("page")
     given = parser.parse_args()
     if given.command == "phantoms":
         for rows in in_processes(phantom_rows, missing(product(SPECIES, MOTIONS, SPECKLES)), given.jobs):
@@ -378,10 +339,8 @@ def main() -> None:
     elif given.command == "pymust":
         for _, motion, _ in missing(("PyMUST", motion, 1) for motion in MOTIONS):
             add(pymust_rows(Array(given.file), motion))
-    elif given.command == "disk":
-        add(disk_rows(Array(given.file)))
     else:
-        TABLE.with_suffix(".md").write_text(page(pd.read_csv(TABLE)), encoding="utf-8")
+        add(disk_rows(Array(given.file)))
 
 
 if __name__ == "__main__":

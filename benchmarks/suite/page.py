@@ -37,6 +37,17 @@ OTHERS = {
 }
 """Metric -> its heading, of which there is the median over the clips, and its decimals."""
 
+OUTSIDE = FOLDER.parent / "outside.csv"
+"""Table of benchmarks/outside.py."""
+
+IMAGES = {
+    "mouse": "Mice, realistic",
+    "human": "People, realistic",
+    "PyMUST": "Rings in water, images of PyMUST",
+    "disk": "A real disk",
+}
+"""Kinds of its images, and their headings."""
+
 NONE = "–"
 
 
@@ -193,6 +204,24 @@ class Page:
             [*rows, ["**shown in 80 %**", *least], ["**equal ones ordered**", *false]],
         )
 
+    def outside(self) -> str:
+        """Errors and thickening on motions that no heart makes, two tables for each kind of images."""
+        rows = pd.read_csv(OUTSIDE)
+        means = rows.groupby(["images", "motion", "tracker"], sort=False).mean(numeric_only=True)
+        texts = []
+        for images, title in IMAGES.items():
+            of = {
+                str(motion): means.loc[images, motion] for motion in rows[rows["images"] == images]["motion"].unique()
+            }
+            names = [name for name in self.order if all(name in found.index for found in of.values())]
+            others = [name for name in names if name != REFERENCE]
+            errors = [[motion, *_errors(found, others)] for motion, found in of.items()]
+            bias = [[motion, *_thickening(found, names)] for motion, found in of.items()]
+            heads = [f"true (px), `{REFERENCE}` (px)", *(f"`{name}`" for name in others)]
+            texts += [f"### {title}", markdown(["motion", *heads], errors)]
+            texts += [markdown(["motion", "true E_RR (%)", *(f"`{name}`" for name in names)], bias)]
+        return "\n\n".join(texts)
+
     def draw(self, folder: Path) -> None:
         """Draw the figures."""
         folder.mkdir(parents=True, exist_ok=True)
@@ -276,6 +305,21 @@ def ranks(row: pd.Series) -> str:
     """Range of ranks."""
     first, last = row["rank_first"], row["rank_last"]
     return NONE if not np.isfinite(first) else f"{first:.0f}" if first == last else f"{first:.0f}–{last:.0f}"
+
+
+def _errors(found: pd.DataFrame, others: list[str]) -> list[str]:
+    """Cells of the errors of a motion."""
+    error = found["error_px"]
+    first = f"{number(found['motion_px'].iloc[0])}, {number(error[REFERENCE], 2)}"
+    return [first, *(number(error[name] / error[REFERENCE], 2) for name in others)]
+
+
+def _thickening(found: pd.DataFrame, names: list[str]) -> list[str]:
+    """Cells of the thickening of a motion."""
+    true = found["true_radial_strain_percent"]
+    bias, sure = found["radial_strain_percent"] - true, found[["stated_percent", "right_percent"]]
+    cells = [f"{number(bias[name])} ({' / '.join(number(each, 0) for each in sure.loc[name])})" for name in names]
+    return [number(true.iloc[0]), *cells]
 
 
 def _limits(tracked: pd.Series, true: pd.Series) -> str:

@@ -1,7 +1,6 @@
-"""The motions of benchmarks/outside.py, the ring that is tracked there, and the page."""
+"""The motions of benchmarks/outside.py, and the ring that is tracked there."""
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from benchmarks import outside
@@ -56,12 +55,3 @@ def test_turned_ring_has_no_strain_and_is_found_where_it_was():
     assert np.nanmax(np.abs(strain)) < 1e-9
     stretched = operator.strain(0.1 * offset[None])[0]
     assert np.nanmean(stretched, 0) == pytest.approx([0.105, 0.105, 0], abs=1e-6)
-
-
-def test_page_has_the_ratio_to_the_parent():
-    row = {"motion_px": 3.0, "radial_strain_percent": 4.0, "true_radial_strain_percent": 1.0}
-    row |= {"images": "mouse", "motion": "still", "speckle": 1, "stated_percent": 70.0, "right_percent": 60.0}
-    rows = [row | {"tracker": name, "error_px": error} for name, error in (("bspline_dic", 0.5), ("dis", 0.75))]
-    page = outside.page(pd.DataFrame(rows))
-    assert "| still | 3.0 | 0.50 | 1.50 |" in page
-    assert "+3.0 (70/60)" in page
