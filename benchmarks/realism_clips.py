@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from apical_clip import VIEW
 from numpy.typing import NDArray
 from physiology_pictures import ELEMENTS
-from realism import VIEW, solved
+from realism import solved
 
 import echotruth as et
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
@@ -29,7 +30,7 @@ from echotruth.seeds import generator
 HEARTS, CYCLE, SHOWN = 28, 12, 3
 """Hearts, frames of a beat, and frames of a clip."""
 IMAGED, RANGE_DB = 128, 100.0
-"""Pixels along a side of an image, 180 mm, and decibels from black to white."""
+"""Pixels along a side of an image, 200 mm, and decibels from black to white."""
 APEX = {"geometry.apex_wall_mm": {"uniform": [2, 10]}}
 """What is drawn of a heart beside `hearts`: that of the human clip was drawn thicker than ours is by default."""
 DRAWN: dict[str, Any] = {

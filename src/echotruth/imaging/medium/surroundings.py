@@ -60,7 +60,7 @@ class SurroundingsMotion:
     wall is at rest.
 
     What moves rigidly before the probe is the heart with all that lies as deep or deeper. Above it this motion falls in
-    proportion to the range, to 0 at the array.
+    proportion to the range, to 0 at the array; the chest wall has none, as the probe is pressed against it.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class SurroundingsMotion:
     ) -> None:
         self._heart, self._position, self._at_rest = heart, position, decay_length == 0
         if heart.rigid is not None:
-            self._rigid_share = self._depth_share(heart.rigid.centre)
+            self._rigid_share = self._depth_share(heart.rigid.centre, tissue)
         if self._at_rest:
             return
         from scipy.spatial import cKDTree  # takes 50 ms, and few views have surroundings
@@ -108,10 +108,11 @@ class SurroundingsMotion:
         inward[atrial | at_rest] = 0
         return share[:, None], inward
 
-    def _depth_share(self, array: Floats) -> Floats:
+    def _depth_share(self, array: Floats, tissue: NDArray[np.uint8] | None) -> Floats:
         """Share (n, 1) of the rigid motion before an array, whose middle is given, (3,), m."""
         nearest = np.linalg.norm(self._heart.positions(0) - array, axis=1).min()
-        return np.minimum(np.linalg.norm(self._position - array, axis=1) / nearest, 1.0)[:, None]
+        share = np.minimum(np.linalg.norm(self._position - array, axis=1) / nearest, 1.0)
+        return np.where(tissue == TissueLabel.CHEST_WALL, 0.0, share)[:, None]
 
     def __call__(self, frame: int) -> Floats:
         """Positions in a frame, (n, 3), m."""

@@ -94,10 +94,10 @@ class TissueImages:
 
     @cached_property
     def _motions(self) -> list[Callable[[int], Floats]]:
-        """Positions of the knots, (n, 3), m, if there is tissue of an atrium, the chest wall, or any other."""
+        """Positions of the knots, (n, 3), m, if there is tissue of an atrium, or any other that is not at rest."""
         knots = self._in_heart_frame(*(np.linspace(at[0], at[-1], KNOTS) for at in (self._axial, self._lateral)))
         decay = self._config.realism.surroundings.motion_decay_mm * mm
-        kinds = (TissueLabel.LEFT_ATRIUM, TissueLabel.CHEST_WALL, TissueLabel.RIGHT_VENTRICLE)
+        kinds = (TissueLabel.LEFT_ATRIUM, TissueLabel.RIGHT_VENTRICLE)
         return [SurroundingsMotion(self._heart, knots, decay, np.full(len(knots), kind, np.uint8)) for kind in kinds]
 
     @cached_property
@@ -108,12 +108,12 @@ class TissueImages:
         return atria, chest, np.where(of_atria | of_chest, 0, self._at_ed).astype(np.uint8)
 
     def _around(self, frame: int) -> Labels:
-        *over, rest = zip(self._layers, self._motions, strict=True)
-        found = self._moved(*rest, frame)
-        for labels, motion in over:
-            if labels.any():
-                moved = self._moved(labels, motion, frame)
-                np.copyto(found, moved, where=moved > 0)
+        (atria, chest, rest), (of_atria, of_rest) = self._layers, self._motions
+        found = self._moved(rest, of_rest, frame)
+        if atria.any():
+            moved = self._moved(atria, of_atria, frame)
+            np.copyto(found, moved, where=moved > 0)
+        np.copyto(found, chest, where=chest > 0)
         if self._config.realism.neighbours.chambers_dB is None:
             found[self._above_lid(frame)] = TissueLabel.OTHER
         found[self._hidden] = TissueLabel.OTHER
