@@ -28,11 +28,12 @@ import echotruth as et
 from echotruth.cases import Case
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.sequence import Sequence
-from echotruth.imaging.truth import pixel_truth
+from echotruth.imaging.truth import pixel_truth, wall_mask
 from echotruth.imaging.view import before_probe
 from echotruth.report import style
-from echotruth.repository.datasets import as_stored, clip_dataset
+from echotruth.repository.datasets import as_stored, clip_dataset, source_of
 from echotruth.seeds import generator
+from echotruth.tracking.point_grid import grid_positions
 from echotruth.units import MHz, mm
 
 FRAMES, SIZE = 40, 512
@@ -65,7 +66,9 @@ class Imaged:
         """The clip without its images."""
         truth = pixel_truth(self._moving, self._plane, *pixel_centres(self.config.bmode, SIZE))
         values = {f"truth/{SIZE}": {name: truth[name] for name in ("labels", "wall_depth")}}
-        return clip_dataset(self.heart, self._case, self.view, self._plane, as_stored(self._case, values))
+        points, stored = grid_positions(self.config), as_stored(self._case, values)
+        inside = wall_mask(self.heart, self._plane, points[:, 0, 1], points[0, :, 0])
+        return clip_dataset(self._case, self.view, stored, inside, source_of(self.heart, self._plane))
 
     def image(self, frame: int) -> NDArray[np.uint8]:
         """The image of one frame, as bright as its brightest echo."""
