@@ -15,7 +15,7 @@ Rows are added to results/outside.csv as they are made; the page of the suite ha
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -32,21 +32,19 @@ from threadpoolctl import threadpool_limits
 
 import echotruth as et
 from benchmarks.parallel import in_processes
-from benchmarks.suite.hearts import configured
+from benchmarks.suite.hearts import SUBSET_MM, TRACKERS, WINDOW_MM, configured
 from benchmarks.suite.scores import view_clips
-from echotruth.evaluation.clip import Clip
 from echotruth.evaluation.point_tracks import SIDE
+from echotruth.evaluation.reliability import WITHIN
 from echotruth.evaluation.scoring import estimated
-from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.mechanics.geometry.ellipsoid import semi_axes
 from echotruth.mechanics.prescribed import motion_amplitude
-from echotruth.section import Section
+from echotruth.tracking.plausibility import REFERENCE_WALL_MM
+from echotruth.units import mm
 
 TABLE = Path(__file__).parent / "results/outside.csv"
 Floats = NDArray[np.float64]
 Row = dict[str, Any]
-Radial = Callable[[Floats], Floats]
-"""From displacement (frame, point, 2), m, to radial strain (frame, point)."""
 
 
 class Wall(NamedTuple):
@@ -72,8 +70,8 @@ STEP = 1e-4
 LATERAL, DEPTH = STEP * np.arange(-125, 126), STEP * np.arange(100, 351)
 RANGE_DB, LIT = 30, 60
 """Of its grey map, from black to white; and the blurred grey of the disk at least."""
-WALL, POINTS, STEPS = (4e-3, 9e-3), 4, 2
-"""Inner and outer radius of the ring that is tracked, m, step of the points, px, and of the frames of the disk."""
+WALL, STEPS = (4e-3, 9e-3), 2
+"""Inner and outer radius of the ring that is tracked, m, and step of the frames of the disk."""
 FRAMES, DENSITY = 12, 6e7
 """Frames of a simulated ring to end-systole, and its scatterers, 1/m^2."""
 CLIP = ("images", "motion", "speckle")
@@ -157,29 +155,34 @@ def phantom_rows(given: tuple[str, str, int]) -> list[Row]:
     species, motion, speckle = given
     config = phantom(species, speckle)
     (case,) = et.expand(config)
+    names, rows = {"images": species, "motion": motion, "speckle": speckle}, []
     with threadpool_limits(1):
         truth, _, (clip, _) = view_clips(case, moving(config, motion, speckle), VIEW)
-        true = truth.displacement / clip.spacing
-        names = {"images": species, "motion": motion, "speckle": speckle}
-        found = scores(clip, config.tracking.trackers, true, truth.es, lambda u: truth.operator.strain(u)[..., 0])
-        return [names | row for row in found]
+        for tracker, settings in config.tracking.trackers.items():
+            (found, quality), _ = estimated(clip, settings)
+            moved, es = (found * clip.spacing, truth.displacement), truth.es
+            radial = [truth.operator.strain(each)[es, :, 0] for each in moved]
+            rows.append(names | {"tracker": tracker} | scores(moved, quality, es, clip.size * clip.spacing, radial))
+    return rows
 
 
-def scores(clip: Clip, trackers: Mapping[str, Section], true: Floats, es: int, radial: Radial) -> Iterator[Row]:
-    """What each tracker finds in a clip against the true displacement (frame, point, 2), px."""
-    unit = clip.size / SIDE
-    for name, settings in trackers.items():
-        (found, quality), _ = estimated(clip, settings)
-        apart = np.linalg.norm(np.nan_to_num(found) - true, axis=-1)
-        yield {
-            "tracker": name,
-            "error_px": np.sqrt(np.mean(apart[es] ** 2)) / unit,
-            "motion_px": np.sqrt(np.mean((true[es] ** 2).sum(-1))) / unit,
-            "radial_strain_percent": 100 * np.nanmean(radial(found * clip.spacing)[es]),
-            "true_radial_strain_percent": 100 * np.nanmean(radial(true * clip.spacing)[es]),
-            "stated_percent": 100 * np.mean(np.nan_to_num(quality[1:])),
-            "right_percent": 100 * np.mean(apart[1:] < unit),
-        }
+def scores(
+    displacement: tuple[Floats, Floats], quality: Floats, es: int, side: float, radial: Sequence[Floats]
+) -> dict[str, float]:
+    """How tracked and true displacement (frame, point, 2), m, differ, and their radial strain (point,) at end-systole.
+
+    `side` is that of the image, m.
+    """
+    found, true = (each * SIDE / side for each in displacement)
+    apart = np.linalg.norm(np.nan_to_num(found) - true, axis=-1)
+    return {
+        "error_px": np.sqrt(np.mean(apart[es] ** 2)),
+        "motion_px": np.sqrt(np.mean((true[es] ** 2).sum(-1))),
+        "radial_strain_percent": 100 * np.nanmean(radial[0]),
+        "true_radial_strain_percent": 100 * np.nanmean(radial[1]),
+        "stated_percent": 100 * np.mean(np.nan_to_num(quality[1:])),
+        "right_percent": 100 * np.mean(apart[1:] < WITHIN),
+    }
 
 
 class Array:
@@ -238,32 +241,38 @@ class Array:
         return float(np.polyfit(lateral, velocity, 1, w=weight)[0])
 
 
-def ring(frames: NDArray[np.uint8], centre: Floats, wall: tuple[float, float]) -> tuple[Clip, StrainOperator]:
-    """Clip of a ring of radii `wall`, m, about a centre, px, there and back, and the strain at its points."""
-    rows, columns = np.indices(frames.shape[1:])
-    offset = (np.stack([columns, rows], -1) - centre) * STEP
-    radius = np.linalg.norm(offset, axis=-1)
-    mask = (radius > wall[0]) & (radius < wall[1])
-    inside = mask[::POINTS, ::POINTS]
-    offset, points = (each[::POINTS, ::POINTS][inside] for each in (offset, np.stack([columns, rows], -1)))
-    normal = offset / np.linalg.norm(offset, axis=-1)[:, None]
-    axes = np.stack([normal, normal[:, ::-1] * [-1, 1]], 1)
-    closed = frames[[*range(len(frames)), *range(len(frames) - 2, 0, -1)]]
-    clip = Clip(closed, mask, inside, points.astype(float), STEP, np.arange(len(closed)) / len(closed), 1)
-    return clip, StrainOperator(offset, axes, RADIUS * STEP * len(rows))
-
-
 def ring_rows(names: Row, frames: NDArray[np.uint8], centre: Floats, motion: Polar, amplitude: Floats) -> list[Row]:
-    """Rows of the trackers on a ring that moves in frames (frame, axial, lateral), and back."""
-    clip, operator = ring(frames, centre, WALL)
-    nodes = np.column_stack([(clip.points - centre) * STEP, np.zeros(len(clip.points))])
-    wall = Wall(*(np.full(len(nodes), radius) for radius in WALL))
-    true = displacement(nodes, wall, motion, SPECKLES[0], amplitude)[..., :2] / STEP
-    closed = true[[*range(len(true)), *range(len(true) - 2, 0, -1)]]
-    trackers = configured("mouse", {}).tracking.trackers
-    with threadpool_limits(1):
-        found = scores(clip, trackers, closed, len(frames) - 1, lambda u: operator.strain(u)[..., 0])
-        return [names | row for row in found]
+    """Rows of the trackers on a ring about a centre, px, that moves in frames (frame, axial, lateral), and back."""
+    again = [*range(len(frames)), *range(len(frames) - 2, 0, -1)]
+    clip = et.read_clip(frames[again], spacing_mm=1e3 * STEP, frame_time_ms=4)
+    around = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    circle = np.column_stack([np.cos(around), np.sin(around)])
+    drawn = et.Wall(*(centre + radius / STEP * circle for radius in WALL), VIEW)
+    es, rows = len(frames) - 1, []
+    scale = np.diff(WALL).item() / (REFERENCE_WALL_MM * mm)  # over a mouse, of which the lengths of the suite are
+    lengths = {"corrected": {"window_mm": scale * WINDOW_MM}, "affine_dic": {"subset_mm": scale * SUBSET_MM}}
+    for tracker, given in TRACKERS.items():
+        options = {
+            key: value for key, value in (given | lengths.get(tracker, {})).items() if key not in ("method", "track")
+        }
+        strain = et.speckle_tracking(clip, drawn, given.get("track", given["method"]), **options)
+        offset = strain["position"].values - centre * STEP
+        true = on_ring(offset, motion, amplitude)[again]
+        far, near = (offset * (1 + sign * 1e-3) for sign in (1, -1))
+        along = far - near + on_ring(far, motion, amplitude)[es] - on_ring(near, motion, amplitude)[es]
+        radial = ((np.linalg.norm(along, axis=-1) / np.linalg.norm(far - near, axis=-1)) ** 2 - 1) / 2
+        moved = strain["displacement"].values, true
+        thickening = strain["strain"].values[es, :, 0], radial
+        one = scores(moved, strain["quality"].values, es, len(DEPTH) * STEP, thickening)
+        rows.append(names | {"tracker": tracker} | one)
+    return rows
+
+
+def on_ring(offset: Floats, motion: Polar, amplitude: Floats) -> Floats:
+    """Displacement (frame, n, 2), m, of points of a ring (n, 2), m from its centre."""
+    wall = Wall(*(np.full(len(offset), radius) for radius in WALL))
+    nodes = np.column_stack([offset, np.zeros(len(offset))])
+    return displacement(nodes, wall, motion, SPECKLES[0], amplitude)[..., :2]
 
 
 def disk_rows(array: Array) -> list[Row]:
@@ -302,12 +311,9 @@ def pymust_rows(array: Array, motion: str) -> list[Row]:
     random, outer = np.random.default_rng(SPECKLES[0]), WALL[1]
     place = random.uniform(-outer, outer, (round(4 * outer**2 * DENSITY), 2))
     radius = np.linalg.norm(place, axis=-1)
-    kept = np.column_stack([place, 0 * radius])[(radius < outer) & (radius > WALL[0])]
-    wall = Wall(*(np.full(len(kept), each) for each in WALL))
-    amplitude = np.sin(np.linspace(0, np.pi / 2, FRAMES)) ** 2
-    moved = kept + displacement(kept, wall, MOTIONS[motion], SPECKLES[0], amplitude)
-    centre = np.full(2, (len(LATERAL) - 1) / 2)
-    images = array.images(moved[..., :2] + [0, DEPTH.mean()], random.normal(size=len(kept)))
+    kept, amplitude = place[(radius < outer) & (radius > WALL[0])], np.sin(np.linspace(0, np.pi / 2, FRAMES)) ** 2
+    moved, centre = kept + on_ring(kept, MOTIONS[motion], amplitude), np.full(2, (len(LATERAL) - 1) / 2)
+    images = array.images(moved + [0, DEPTH.mean()], random.normal(size=len(kept)))
     names = {"images": "PyMUST", "motion": motion, "speckle": 1}
     return ring_rows(names, array.grey(images), centre, MOTIONS[motion], amplitude)
 

@@ -1,4 +1,4 @@
-"""The motions of benchmarks/outside.py, and the ring that is tracked there."""
+"""The motions and the scores of benchmarks/outside.py."""
 
 import numpy as np
 import pytest
@@ -45,13 +45,12 @@ def test_sector_does_not_move_or_moves_outwards():
         assert np.all(np.sign(shift) == sign)
 
 
-def test_turned_ring_has_no_strain_and_is_found_where_it_was():
-    centre, turn = np.array([120.0, 130.0]), np.radians(8)
-    clip, operator = outside.ring(np.zeros((3, 251, 251), np.uint8), centre, outside.WALL)
-    offset = (clip.points - centre) * outside.STEP
-    back = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    strain = operator.strain((offset @ back.T - offset)[None])
-    assert len(clip.frames) == 4
-    assert np.nanmax(np.abs(strain)) < 1e-9
-    stretched = operator.strain(0.1 * offset[None])[0]
-    assert np.nanmean(stretched, 0) == pytest.approx([0.105, 0.105, 0], abs=1e-6)
+def test_scores_of_what_is_found_and_of_a_shift():
+    true = np.random.default_rng(1).normal(0, 1e-3, (4, 50, 2))
+    unit, quality, radial = 25e-3 / 256, np.full((4, 50), 0.8), (np.full(50, 0.3), np.full(50, 0.1))
+    same = outside.scores((true, true), quality, 2, 25e-3, radial)
+    assert (same["error_px"], same["right_percent"], same["stated_percent"]) == pytest.approx((0, 100, 80))
+    assert same["motion_px"] == pytest.approx(np.sqrt((true[2] ** 2).sum(-1).mean()) / unit)
+    shifted = outside.scores((true + [3 * unit, 4 * unit], true), quality, 2, 25e-3, radial)
+    assert (shifted["error_px"], shifted["right_percent"]) == pytest.approx((5, 0))
+    assert (same["radial_strain_percent"], same["true_radial_strain_percent"]) == pytest.approx((30, 10))
