@@ -64,13 +64,13 @@ Polar = Callable[[Wall, Floats, Floats, np.random.Generator], tuple[Floats, Floa
 VIEW, CHANGE = "mid", 0.25
 """View, and the change of the area of the cavity, of its area, where a wall contracts or is dilated."""
 TURN = np.radians(10)
-SPECIES, SPECKLES = ("mouse", "human"), (1, 2)
+SPECIES, SPECKLES = ("mouse", "human"), (1,)
 STEP = 1e-4
 """Of the pixels of PyMUST's images, m."""
 LATERAL, DEPTH = STEP * np.arange(-125, 126), STEP * np.arange(100, 351)
 RANGE_DB, LIT = 30, 60
 """Of its grey map, from black to white; and the blurred grey of the disk at least."""
-WALL, STEPS = (4e-3, 9e-3), 2
+WALL, STEPS = (6e-3, 9e-3), 2
 """Inner and outer radius of the ring that is tracked, m, and step of the frames of the disk."""
 FRAMES, DENSITY = 12, 6e7
 """Frames of a simulated ring to end-systole, and its scatterers, 1/m^2."""

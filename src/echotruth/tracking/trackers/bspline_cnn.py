@@ -9,7 +9,7 @@ correction is interpolated linearly.
 It knows whole beats of hearts alone. So the images choose the weight of its correction, one a clip: that with which
 they are most alike along the motion (:mod:`echotruth.tracking.similarity`), with a small bonus, since `bspline_dic` is
 fitted to these very images, and the true motion is a little less like them. A clip that is open, of several beats or of
-a wall that does not move has no correction at all.
+a wall that does not contract has no correction at all.
 """
 
 import logging
@@ -65,6 +65,10 @@ CORRECTION_WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 BONUS = 0.04
 """What the similarity of images along the whole correction may fall short of that along the motion of `bspline_dic`;
 docs/tracking.md says on which clips it was chosen."""
+LEAST_CONTRACTION = 0.1
+"""Mean motion of the wall towards the cavity in the frame in which it is largest, over its thickness, below which the
+network is not used: it has learned from hearts that contract. Hearts have 0.2 or more, walls that rest, turn, twist or
+thin 0.09 or less (docs/tracking.md)."""
 LEAST_FRAMES = 6
 """Frames of a beat at least, of which 24 phases can be distinguished."""
 
@@ -130,8 +134,9 @@ def unknown_motion(clip: TrackerInput, features: RayFeatures) -> str:
     """Why a clip is none of those that the network knows, the beginning of a sentence; empty if it may be one."""
     if not clip.is_closed:
         return "the clip is no closed cycle"
-    if features.scale <= LEAST_SCALE * features.rays.thickness:
-        return f"the wall moves by less than {100 * LEAST_SCALE:.0f} % of its thickness"
+    outwards = features.displacement[:, :, features.rays.crosses, 0].mean((1, 2)).min()
+    if outwards > -LEAST_CONTRACTION * features.rays.thickness:
+        return f"the wall moves towards the cavity by less than {100 * LEAST_CONTRACTION:.0f} % of its thickness"
     if period := repetition(features.places().reshape(len(clip.frames), -1, 2)):
         return f"the motion comes again after {period} frames, and the clip has {len(clip.frames)}"
     return ""
