@@ -33,6 +33,7 @@ TRACKERS: dict[str, tuple[str, dict[str, Any]]] = {
     "bspline_dic": ("bspline_dic", {}),
     "bspline_dic, grey values": ("bspline_dic", {"dynamic_range_dB": 0.0}),
     "affine_dic": ("examples.affine_dic:track", {}),
+    "window_deformation": ("window_deformation", {}),
     "dis": ("dis", {}),
     "dis_fine": ("dis", {"preset": "fine"}),
 }

@@ -209,7 +209,7 @@ class Page:
         rows = pd.read_csv(OUTSIDE)
         means = rows.groupby(["images", "motion", "tracker"], sort=False).mean(numeric_only=True)
         texts = []
-        for images, title in IMAGES.items():
+        for images in rows["images"].unique():
             of = {
                 str(motion): means.loc[images, motion] for motion in rows[rows["images"] == images]["motion"].unique()
             }
@@ -218,7 +218,7 @@ class Page:
             errors = [[motion, *_errors(found, others)] for motion, found in of.items()]
             bias = [[motion, *_thickening(found, names)] for motion, found in of.items()]
             heads = [f"true (px), `{REFERENCE}` (px)", *(f"`{name}`" for name in others)]
-            texts += [f"### {title}", markdown(["motion", *heads], errors)]
+            texts += [f"### {IMAGES[images]}", markdown(["motion", *heads], errors)]
             texts += [markdown(["motion", "true E_RR (%)", *(f"`{name}`" for name in names)], bias)]
         return "\n\n".join(texts)
 

@@ -1,5 +1,7 @@
 """Recorded clips: what a file holds comes back, with its scale and its time, or is told."""
 
+import zlib
+
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -114,6 +116,15 @@ def test_region_beyond_the_image_has_lost_its_scale(tmp_path):
     assert et.read_clip(path, spacing_mm=0.5)["image"].shape == FILM.shape
 
 
+def test_value_of_half_a_number_is_told(tmp_path):
+    path = written(tmp_path / "half.dcm", FILM, SequenceOfUltrasoundRegions=[region((8, 4, 39, 23), (0.04, 0.02))])
+    content = path.read_bytes()
+    place = content.index(b"\x18\x00\x2e\x60FD\x08\x00") + 6  # length of PhysicalDeltaY, the last of the region
+    path.write_bytes(content[:place] + b"\x06" + content[place + 1 :])
+    with pytest.raises(EchoError, match=r"half.dcm: is a damaged DICOM clip|half.dcm: is no DICOM clip"):
+        et.read_clip(path)
+
+
 def test_levels_that_say_how_dark_it_is_are_inverted(tmp_path):
     path = written(tmp_path / "dark.dcm", 255 - FILM, PhotometricInterpretation="MONOCHROME1")
     np.testing.assert_array_equal(et.read_clip(path, **GIVEN)["image"], FILM)
@@ -127,6 +138,14 @@ def test_levels_of_a_palette_are_its_colours(tmp_path):
         palette[f"{name}PaletteColorLookupTableData"] = colours.tobytes()
     path = written(tmp_path / "palette.dcm", FILM, PhotometricInterpretation="PALETTE COLOR", **palette)
     np.testing.assert_array_equal(et.read_clip(path, **GIVEN)["image"], colours[FILM])
+
+
+def test_scale_that_is_empty_is_told(tmp_path):
+    broken = region((8, 4, 39, 23), (0.04, 0.02))
+    broken.PhysicalDeltaX = None
+    path = written(tmp_path / "empty.dcm", FILM, FrameTime=20, SequenceOfUltrasoundRegions=[broken])
+    with pytest.raises(EchoError, match=r"empty.dcm: is a damaged DICOM clip: its region, scale or times cannot be"):
+        et.read_clip(path)
 
 
 @pytest.mark.parametrize(
@@ -306,6 +325,27 @@ def test_animation_of_an_impossible_size_is_told_without_decoding(tmp_path):
     path.write_bytes(content[:6] + size + content[10 : place + 5] + size + content[place + 9 :])
     with pytest.raises(EchoError, match=r"big.gif: is no image that can be read: Image size"):
         et.read_clip(path, **GIVEN)
+
+
+def test_palette_of_no_colours_is_told(tmp_path):
+    path = tmp_path / "none.png"
+    Image.fromarray(FILM[0]).convert("P").save(path)
+    content = path.read_bytes()
+    start = content.index(b"PLTE") - 4
+    end = start + 12 + int.from_bytes(content[start : start + 4], "big")
+    empty = bytes(4) + b"PLTE" + zlib.crc32(b"PLTE").to_bytes(4, "big")
+    path.write_bytes(content[:start] + empty + content[end:])
+    with pytest.raises(EchoError, match=r"none.png: has a pixel of colour \d+, and a palette of 0: save it again"):
+        et.read_clip(tmp_path, **GIVEN)
+
+
+def test_nifti_of_an_unknown_unit_is_told(tmp_path):
+    nibabel = pytest.importorskip("nibabel")
+    image = nibabel.Nifti1Image(FILM.T, np.eye(4))
+    image.header["xyzt_units"] = 128
+    image.to_filename(tmp_path / "unit.nii")
+    with pytest.raises(EchoError, match=r"unit.nii: is no NIfTI file that can be read"):
+        et.read_clip(tmp_path / "unit.nii", **GIVEN)
 
 
 @pytest.mark.parametrize(

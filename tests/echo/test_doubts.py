@@ -6,6 +6,7 @@ from contracting_ring import CENTRE, FRAMES, SIDE
 from scipy.ndimage import gaussian_filter
 
 import echotruth as et
+from echotruth.echo import page
 from echotruth.tracking.plausibility import is_noise
 
 
@@ -41,8 +42,17 @@ def test_noise_has_no_strain(ring, smooth):
     assert "beats" not in strain.attrs["notes"]
 
 
+def test_page_of_noise_says_that_no_motion_is_found(ring, tmp_path):
+    clip = et.read_clip(noise(0, 1), spacing_mm=0.04, frame_time_ms=10)
+    strain = et.speckle_tracking(clip, ring.wall(), "dis")
+    page.draw(clip, strain, tmp_path / "noise.png")
+    assert "unknown (doubtful)" in page.headline(strain) and np.isnan(strain.attrs["drift_percent"])
+
+
 def test_noise_is_told_from_a_ring_in_noise(ring):
     mask = ring.wall().mask((SIDE, SIDE))
+    darker = noise(1, 1) * np.linspace(0.3, 1, SIDE)[:, None]
+    assert is_noise(darker, mask) and is_noise(np.repeat(noise(2, 1), 2, axis=0), mask)
     assert all(is_noise(noise(seed, smooth), mask) for seed in range(20) for smooth in (0, 1, 2))
     assert not is_noise(np.clip(ring.frames + 2.0 * noise(0, 0), 0, 255), mask)
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.suite.quality import calibration_error, curve
 from echotruth.evaluation.point_tracks import flow_error, median_trajectory_error, survival, tap_vid
-from echotruth.evaluation.reliability import counts, summary
+from echotruth.evaluation.reliability import counts, judged, summary
 
 FRAMES, POINTS = 7, 40
 
@@ -154,8 +154,11 @@ def test_points_without_an_estimate_have_quality_zero_and_the_surest_are_in_the_
     assert math.isnan(found.loc[0.5, "observed_percent"])
 
 
-def test_tracker_that_states_no_quality_is_neither_right_nor_wrong_in_it_and_one_that_failed_is_sure_of_nothing():
-    unknown, right = np.full((FRAMES, POINTS), np.nan), np.arange(FRAMES * POINTS).reshape(FRAMES, POINTS) % 2 == 0
-    assert all(np.isnan(value) for value in summary(unknown, right).values())
-    assert sum(step["count"] for step in counts(unknown, right)) == 0
-    assert summary(unknown, np.zeros_like(right))["quality_percent"] == 0
+def test_tracker_that_states_no_quality_is_not_judged_by_it_and_one_that_failed_is_sure_of_nothing():
+    unknown, wrong = np.full((FRAMES, POINTS), np.nan), np.zeros((FRAMES, POINTS), bool)
+    frames = judged(unknown, np.zeros((FRAMES, POINTS, 2)))
+    assert all(np.isnan(value) for value in summary(unknown[frames], wrong[frames]).values())
+    assert sum(step["count"] for step in counts(unknown[frames], wrong[frames])) == 0
+    frames = judged(unknown, np.full((FRAMES, POINTS, 2), np.nan))
+    assert summary(unknown[frames], wrong[frames])["quality_percent"] == 0
+    assert sum(step["count"] for step in counts(unknown[frames], wrong[frames])) == (FRAMES - 1) * POINTS

@@ -13,6 +13,8 @@ from echotruth.tracking.trackers.bspline_cnn import (
     MIRRORED,
     ODD,
     WEIGHTS,
+    contraction,
+    correction_weight,
     over_frames,
     over_phases,
     ray_features,
@@ -239,7 +241,10 @@ def test_healthy_heart_keeps_the_correction():
     [
         (range(BEAT // 2 + 1), "the clip is no closed cycle, which"),
         ([*range(BEAT)] * 2, "the motion comes again after 12 frames, and the clip has 24, which"),
-        ([0, 0, 1, 0, 0, 0, 0], "the wall moves towards the cavity by less than 10 % of its thickness, which"),
+        (
+            [0, 0, 1, 0, 0, 0, 0],
+            "since the first frame the wall moves inwards by less than 10 % of its thickness, which",
+        ),
     ],
 )
 def test_clip_of_another_kind_than_it_has_learned_is_tracked_by_bspline_dic(beat, ring, frames, reason, caplog):
@@ -261,3 +266,21 @@ def test_deviation_lies_between_those_of_network_and_bspline_dic(beat, ring, tmp
         found[weight] = tracked(frames, ring, BsplineCnn(weights=file))[1][1:].mean()
     assert found[0.0] == pytest.approx(plain[1:].mean(), abs=0.05)
     assert found[1.0] < found[0.5] < found[0.0] - 0.1
+
+
+@pytest.mark.parametrize(("too_much", "weight"), [(0.0, 1.0), (0.2, 0.5), (-0.4, 0.0)])
+def test_images_weigh_a_correction_that_is_right_goes_too_far_or_the_wrong_way(beat, ring, too_much, weight):
+    """A motion that is found to four fifths lacks a fifth; a correction has that and `too_much`."""
+    frames = beat(contracting)
+    found, _ = features(frames, ring)
+    step = (0.2 + too_much) * found.rays.in_image(found.displacement)[:, :, found.rays.crosses]
+    given = TrackerInput(frames, ring[1], ring[0], SPACING, np.arange(BEAT) * 5e-3, 0)
+    assert correction_weight(given, replace(found, displacement=0.8 * found.displacement), step) == weight
+
+
+def test_motion_of_the_whole_wall_is_no_contraction(beat, ring):
+    found, _ = features(beat(contracting), ring)
+    shift = found.rays.along_and_across(np.broadcast_to([9.0, -4.0], found.displacement.shape))
+    assert contraction(replace(found, displacement=shift)) == pytest.approx(0, abs=1e-9)
+    moved = replace(found, displacement=found.displacement + shift)
+    assert contraction(moved) == pytest.approx(contraction(found)) and contraction(found) > 3

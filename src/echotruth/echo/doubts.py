@@ -115,7 +115,7 @@ def _rate(moved: Floats, thickness: float) -> str:
 def _stillness(moved: Floats, thickness: float) -> str:
     """Of a wall that hardly moves."""
     largest = np.nanmax(rms_length(moved), initial=0) / thickness
-    if not 0 < largest < LEAST_MOTION:
+    if not np.isfinite(moved).any() or largest >= LEAST_MOTION:
         return ""
     return f"the wall moves by {100 * largest:.2g} % of its thickness at most, as if nothing moved: is it a heart?"
 
@@ -132,7 +132,7 @@ def _drift(strain: xr.Dataset, moved: Floats) -> str:
     """Of a motion that does not close; the last frame is one step before the end of the cycle."""
     length, drift = rms_length(moved), strain.attrs["drift_percent"]
     step = 100 * np.nanmax(rms_length(np.diff(moved, axis=0)), initial=0) / (np.nanmax(length, initial=0) or 1)
-    if drift <= max(LARGEST_DRIFT, step) or length[-1] < LEAST_DRIFT_PX * strain.attrs["spacing"]:
+    if not drift > max(LARGEST_DRIFT, step) or length[-1] < LEAST_DRIFT_PX * strain.attrs["spacing"]:
         return ""
     return f"{drift:.0f} % of the largest displacement is left in the last frame: is it one whole cycle?"
 
@@ -145,7 +145,7 @@ def _estimates(strain: xr.Dataset) -> str:
     known = np.isfinite(strain["displacement"].values[strain.attrs["es_frame"]]).all(axis=-1)
     if (coverage := 100 * known.mean()) < LEAST_COVERAGE:
         return f"only {coverage:.0f} % of the points have an estimate at end-systole"
-    if (mean := quality[known].mean()) < LEAST_QUALITY:
+    if (mean := quality[np.isfinite(quality)].mean()) < LEAST_QUALITY:
         return f"the quality at end-systole is {mean:.2f}, and below {LEAST_QUALITY} in noise: the motion is not found"
     return ""
 

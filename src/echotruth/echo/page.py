@@ -22,7 +22,8 @@ QUALITY = "0 to 1: how probably a point is right within 1/256 of the side of the
 def headline(strain: xr.Dataset) -> str:
     """Global strain of a tracked view in words, and that it is doubtful where there are notes."""
     name, value = global_strain(strain)
-    return f"{name} {value:.1f} %" + (" (doubtful)" if strain.attrs["notes"] else "")
+    shown = f"{value:.1f} %" if np.isfinite(value) else "unknown"
+    return f"{name} {shown}" + (" (doubtful)" if strain.attrs["notes"] else "")
 
 
 def global_strain(strain: xr.Dataset) -> tuple[str, float]:
@@ -127,12 +128,13 @@ def draw(clip: xr.Dataset, strain: xr.Dataset, path: Path) -> None:
 def _title(strain: xr.Dataset) -> str:
     """The clip and its global strain, and on a second line how far to trust it."""
     row = summary(strain)
+    first = f"{Path(str(row['source'])).name}, {row['view']}: {headline(strain)}"
+    if not np.isfinite(strain["displacement"]).any():
+        return f"{first}\n{row['tracker']}, no motion found"
     where = f"at end-systole, {row['end_systole_ms']:.0f} ms"
-    first = f"{Path(str(row['source'])).name}, {row['view']}: {headline(strain)} {where}"
-    is_stated = bool(np.isfinite(strain["quality"].values[strain.attrs["es_frame"]]).any())
-    quality = f"{row['quality']:.2f} ({QUALITY})" if is_stated else "unknown"
+    quality = f"{row['quality']:.2f} ({QUALITY})" if np.isfinite(strain["quality"]).any() else "unknown"
     rest = f"drift {row['drift_percent']:.0f} % of the largest displacement, quality {quality}"
-    return f"{first}\n{row['tracker']}, {rest}"
+    return f"{first} {where}\n{row['tracker']}, {rest}"
 
 
 def _image(axis: Axes, clip: xr.Dataset, strain: xr.Dataset, frame: int, title: str) -> None:
@@ -144,7 +146,9 @@ def _image(axis: Axes, clip: xr.Dataset, strain: xr.Dataset, frame: int, title: 
     for number, colour in enumerate(COLOURS):
         lateral, axial = place[frame, contour == number].T
         axis.plot(lateral, axial, color=colour, linewidth=1.2)
-    least, largest = np.nanmin(place, axis=(0, 1)), np.nanmax(place, axis=(0, 1))
+    # Also where no line was followed.
+    shown = np.concatenate([place.reshape(-1, 2), 1e3 * strain["position"].values])
+    least, largest = np.nanmin(shown, axis=0), np.nanmax(shown, axis=0)
     margin = 0.12 * (largest - least).max()
     axis.set(xlim=(least[0] - margin, largest[0] + margin), ylim=(largest[1] + margin, least[1] - margin))
     axis.set_title(title, fontsize=9)

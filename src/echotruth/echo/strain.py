@@ -62,8 +62,7 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
         it; `rotation` (frame,), rad; `cavity_area` (frame,), m2. Attributes: `es_frame`, the frame of the smallest
         cavity, and `end_systole`, s; `gcs_percent` or `gls_percent`, of the middle line at end-systole;
         `drift_percent`, the displacement left in the last frame over the largest; `notes`, what should make one doubt,
-        a line each; `tracker`, `view`. NaN where there is no estimate, as
-        everywhere in noise.
+        a line each; `tracker`, `view`. NaN where there is no estimate, as everywhere in noise.
 
     Raises
     ------
@@ -214,7 +213,9 @@ def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall)
         "es_frame": es,
         "end_systole": float(time[es]),
         name: 100 * float(curves["line_strain"][es, 1]),
-        "drift_percent": 100 * float(length[-1]) / largest if largest > 0 else 0.0,
+        "drift_percent": 100 * float(length[-1]) / largest
+        if largest > 0
+        else (0.0 if np.isfinite(moved).any() else np.nan),
     }
 
 

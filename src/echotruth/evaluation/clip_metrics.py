@@ -221,6 +221,7 @@ def clip_rows(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row
     displacement, quality = (found[name][:, truth.inside].astype(float) for name in ("displacement", "quality"))
     displacement /= truth.unit
     within = np.linalg.norm(displacement - truth.displacement[..., :2], axis=-1) < reliability.WITHIN
+    judged = reliability.judged(quality, displacement)
     tracked = found["tracked_segment_strain"][:, _ENGINEERING].astype(float)
     tracked, true, time = (each[: truth.beat] for each in (tracked, truth.curves["segment_strain"], truth.time))
     segments = segment_strain.segment_rows(tracked, true, truth.tissue, truth.plane, time, truth.es)
@@ -228,11 +229,11 @@ def clip_rows(found: Arrays, truth: ClipTruth) -> tuple[Row, list[Row], list[Row
         **_truth_metrics(truth),
         **metrics(found, truth.plane),
         **track_metrics(displacement, quality, truth),
-        **reliability.summary(quality[1:], within[1:]),
+        **reliability.summary(quality[judged], within[judged]),
         **_line_strain(found, truth),
         **segment_strain.errors(segments),
     }
-    return clip, segments, [dict(step) for step in reliability.counts(quality[1:], within[1:])]
+    return clip, segments, [dict(step) for step in reliability.counts(quality[judged], within[judged])]
 
 
 def _line_strain(found: Arrays, truth: ClipTruth) -> dict[str, float]:

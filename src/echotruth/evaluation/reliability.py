@@ -23,14 +23,20 @@ COLUMNS = ("quality_low", "quality_high", *COUNTS)
 """Columns of the rows of steps."""
 
 
+def judged(quality: Floats, displacement: Floats) -> slice:
+    """Frames in which a quality (frame, ...) is judged: all but the first; none of a tracker that finds a displacement
+    (frame, ...) and states no quality."""
+    is_stated = bool(np.isfinite(quality).any() or np.isnan(displacement).all())
+    return slice(1 if is_stated else len(quality), None)
+
+
 def counts(quality: Floats, within: NDArray[np.bool_]) -> list[dict[str, float]]:
     """Number of points by their quality, and how many of them are right.
 
     Parameters
     ----------
     quality : ndarray of any shape
-        0 to 1; NaN, of a point without an estimate, counts as 0. If all are NaN although some points are right, the
-        tracker states no quality, and none counts.
+        0 to 1; NaN, of a point without an estimate, counts as 0.
     within : ndarray of the same shape, bool
         Whether the point is right.
 
@@ -60,29 +66,22 @@ def summary(quality: Floats, within: NDArray[np.bool_]) -> dict[str, float]:
         expected calibration error (Naeini et al., Proc AAAI 2015; 29, doi 10.1609/aaai.v29i1.9602); brier_score, the
         mean of (quality - right)^2 (Brier, Mon Weather Rev 1950; 78:1).
     """
-    stated, right = _stated(quality, within)
+    stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1)
     nothing = not stated.size
     return {
         "quality_percent": np.nan if nothing else float(100 * np.mean(stated)),
-        "within_percent": np.nan if nothing else float(100 * np.mean(right)),
+        "within_percent": np.nan if nothing else float(100 * np.mean(within)),
         "calibration_error_percent": expected_error(*_counts(quality, within)),
-        "brier_score": np.nan if nothing else float(np.mean((stated - right) ** 2)),
+        "brier_score": np.nan if nothing else float(np.mean((stated - within) ** 2)),
     }
 
 
 def _counts(quality: Floats, within: NDArray[np.bool_]) -> list[Floats]:
     """Columns of `COUNTS`, each (step,)."""
-    stated, right = _stated(quality, within)
+    stated = np.clip(np.nan_to_num(quality, nan=0.0), 0, 1).ravel()
     step = np.minimum((stated * BINS).astype(int), BINS - 1)
-    weights = np.ones(stated.size), stated, right
+    weights = np.ones(stated.size), stated, within.ravel().astype(float)
     return [np.asarray(np.bincount(step, weight, BINS), float) for weight in weights]
-
-
-def _stated(quality: Floats, within: NDArray[np.bool_]) -> tuple[Floats, Floats]:
-    """Quality, 0 to 1, and whether it is right, 1 or 0, of each point; of none if no quality is stated."""
-    if within.any() and not np.isfinite(quality).any():
-        return np.zeros(0), np.zeros(0)
-    return np.clip(np.nan_to_num(quality, nan=0.0), 0, 1).ravel(), within.ravel().astype(float)
 
 
 def expected_error(count: Floats, quality_sum: Floats, within_count: Floats) -> float:

@@ -200,7 +200,7 @@ def violation(values: dict[str, float], bounds: Physiology) -> str:
         holds, rule = (le, "at most") if "_max" in bound.key else (ge, "at least")
         if not holds(values[bound.key], limit):
             # As many digits as show that it does.
-            texts = (f"{values[bound.key]:.{digits}g}" for digits in (3, 6, 17))
+            texts = (f"{values[bound.key]:.{digits}g}" for digits in range(3, 18))
             value = next(text for text in texts if not holds(float(text), limit)).replace("nan", "not a number")
             return f"{bound.description} is {value} and must be {rule} {limit:g} (physiology.{bound.key})."
     return ""

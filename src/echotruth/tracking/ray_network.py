@@ -84,11 +84,13 @@ def read(file: str | Path, channels: int) -> RayNetwork:
     """
     try:
         with np.load(file) as arrays:
+            if "first" in arrays and "least" not in arrays:
+                raise ValueError("they lack the range of each channel: train them again")
             network = RayNetwork(**{name: arrays[name].astype(np.float32) for name in RayNetwork.__annotations__})
         _check(network, channels)
     except (OSError, ValueError, KeyError, TypeError, BadZipFile) as error:
         raise ValueError(
-            f"{file}: holds no weights ({error}): give a file that examples/ray_network.py wrote"
+            f"{file}: holds no weights of this network ({error}): give a file that examples/ray_network.py wrote"
         ) from None
     return network
 

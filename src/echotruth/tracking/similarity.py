@@ -16,7 +16,7 @@ MAX_NCC = 0.9999
 """Correlation at most: images may be the same."""
 
 
-def even_contrast(frames: np.ndarray, thickness: float) -> list[np.ndarray]:
+def even_contrast(frames: np.ndarray, thickness: float, window: float = WINDOW) -> list[np.ndarray]:
     """Images of the same mean and contrast everywhere, lest a bright border that moves by itself outweighs speckle.
 
     Parameters
@@ -25,22 +25,24 @@ def even_contrast(frames: np.ndarray, thickness: float) -> list[np.ndarray]:
         Grey values of any real type; NaN is taken as black.
     thickness : float
         Of the wall, px.
+    window : float
+        Standard deviation of the Gaussian of the local mean and contrast, over the thickness.
 
     Returns
     -------
     list of ndarray of shape (axial, lateral)
         Grey values less their local mean, over their local standard deviation, a number.
     """
-    return [_even(np.nan_to_num(frame), thickness) for frame in grey_levels(frames)]
+    return [_even(np.nan_to_num(frame), BLUR * thickness, window * thickness) for frame in grey_levels(frames)]
 
 
-def _even(grey: np.ndarray, thickness: float) -> np.ndarray:
-    def mean(image: np.ndarray, deviation: float = WINDOW) -> np.ndarray:
-        return cv2.GaussianBlur(image, (0, 0), deviation * thickness, borderType=cv2.BORDER_REFLECT)
+def _even(grey: np.ndarray, blur: float, window: float) -> np.ndarray:
+    def mean(image: np.ndarray, deviation: float) -> np.ndarray:
+        return cv2.GaussianBlur(image, (0, 0), deviation, borderType=cv2.BORDER_REFLECT)
 
-    blurred = mean(grey, BLUR)
-    local = mean(blurred)
-    variance = np.maximum(mean(blurred**2) - local**2, 0)
+    blurred = mean(grey, blur)
+    local = mean(blurred, window)
+    variance = np.maximum(mean(blurred**2, window) - local**2, 0)
     return (blurred - local) / np.sqrt(variance + MIN_STD**2)
 
 

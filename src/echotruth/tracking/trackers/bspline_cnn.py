@@ -63,12 +63,12 @@ MIRRORED = (RAYS // 2 - np.arange(RAYS)) % RAYS
 CORRECTION_WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Weights of the correction that are tried."""
 BONUS = 0.04
-"""What the similarity of images along the whole correction may fall short of that along the motion of `bspline_dic`;
-docs/tracking.md says on which clips it was chosen."""
+"""Largest loss of similarity at which the whole correction is still preferred to none; docs/tracking.md says on which
+clips it was chosen."""
 LEAST_CONTRACTION = 0.1
 """Mean motion of the wall towards the cavity in the frame in which it is largest, over its thickness, below which the
 network is not used: it has learned from hearts that contract. Hearts have 0.2 or more, walls that rest, turn, twist or
-thin 0.09 or less (docs/tracking.md)."""
+dilate 0.03 or less (docs/tracking.md)."""
 LEAST_FRAMES = 6
 """Frames of a beat at least, of which 24 phases can be distinguished."""
 
@@ -99,7 +99,7 @@ class RayFeatures:
 
 
 def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
-    """Path of the points of a clip; its deviation is what the network says and :func:`deviation`, by their weights.
+    """Path of the points of a clip; its deviation is that of the network and `deviation_before`, by their weights.
 
     Raises
     ------
@@ -119,14 +119,14 @@ def track(clip: TrackerInput, settings: BsplineCnn) -> Path:
     rays, network = features.rays, read(settings.weights or WEIGHTS, len(CHANNELS))
     if reason := unknown_motion(clip, features):
         logging.getLogger("echotruth").warning(f"{reason}, which the network does not know: tracked by bspline_dic")
-        return replace(path, deviation=deviation(clip, path))
+        return replace(path, deviation=deviation_before(clip, path))
     correction, stated = seen_twice(network, features.channels)
     values = features.scale * np.concatenate([rays.in_image(correction), stated[..., None]], -1)
     step = over_frames(values[..., :2], frames)[:, :, rays.crosses]
     weight = correction_weight(clip, features, step)
     at_points = rays.interpolate(np.moveaxis(values, 0, 2), clip.points)
     found = over_frames(np.moveaxis(at_points, 1, 0), frames)
-    variance = weight * found[..., 2] ** 2 + (1 - weight) * deviation(clip, path) ** 2
+    variance = weight * found[..., 2] ** 2 + (1 - weight) * deviation_before(clip, path) ** 2
     return replace(path, displacement=path.displacement + weight * found[..., :2], deviation=np.sqrt(variance))
 
 
@@ -134,12 +134,20 @@ def unknown_motion(clip: TrackerInput, features: RayFeatures) -> str:
     """Why a clip is none of those that the network knows, the beginning of a sentence; empty if it may be one."""
     if not clip.is_closed:
         return "the clip is no closed cycle"
-    outwards = features.displacement[:, :, features.rays.crosses, 0].mean((1, 2)).min()
-    if outwards > -LEAST_CONTRACTION * features.rays.thickness:
-        return f"the wall moves towards the cavity by less than {100 * LEAST_CONTRACTION:.0f} % of its thickness"
+    if contraction(features) < LEAST_CONTRACTION * features.rays.thickness:
+        least = f"{100 * LEAST_CONTRACTION:.0f} % of its thickness"
+        return f"since the first frame the wall moves inwards by less than {least}"
     if period := repetition(features.places().reshape(len(clip.frames), -1, 2)):
         return f"the motion comes again after {period} frames, and the clip has {len(clip.frames)}"
     return ""
+
+
+def contraction(features: RayFeatures) -> float:
+    """Mean motion of the wall towards the cavity, less that of the whole wall, in the frame of the largest, px."""
+    rays = features.rays
+    moved = rays.in_image(features.displacement)[:, :, rays.crosses]
+    moved = moved - moved.mean((1, 2), keepdims=True)
+    return float(-(moved * DIRECTIONS[rays.crosses]).sum(-1).mean((1, 2)).min())
 
 
 def correction_weight(clip: TrackerInput, features: RayFeatures, step: np.ndarray) -> float:
@@ -156,7 +164,7 @@ def correction_weight(clip: TrackerInput, features: RayFeatures, step: np.ndarra
     return max(CORRECTION_WEIGHTS, key=likeness)
 
 
-def deviation(clip: TrackerInput, path: Path) -> np.ndarray:
+def deviation_before(clip: TrackerInput, path: Path) -> np.ndarray:
     """Standard deviation (frame, n) of the error of `bspline_dic` along each axis, px, as its quality has it."""
     terms = squares(path, speckle_length(clip.frames[0], clip.mask), clip.shape)
     return np.sqrt(error_model(BsplineDic()).variance(terms)) * IMAGE_FRACTION * max(clip.shape)
