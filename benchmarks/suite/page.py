@@ -48,6 +48,9 @@ IMAGES = {
 }
 """Kinds of its images, and their headings."""
 
+LEAST_ERROR = 0.01
+"""Error over which others are taken at least, 1/256 of the side: images of a wall at rest may be all the same."""
+
 NONE = "–"
 
 
@@ -206,19 +209,16 @@ class Page:
 
     def outside(self) -> str:
         """Errors and thickening on motions that no heart makes, two tables for each kind of images."""
-        rows = pd.read_csv(OUTSIDE)
-        means = rows.groupby(["images", "motion", "tracker"], sort=False).mean(numeric_only=True)
         texts = []
-        for images in rows["images"].unique():
-            of = {
-                str(motion): means.loc[images, motion] for motion in rows[rows["images"] == images]["motion"].unique()
-            }
+        for images, rows in pd.read_csv(OUTSIDE).groupby("images", sort=False):
+            by_motion = rows.groupby("motion", sort=False)
+            of = {str(motion): found.groupby("tracker").mean(numeric_only=True) for motion, found in by_motion}
             names = [name for name in self.order if all(name in found.index for found in of.values())]
             others = [name for name in names if name != REFERENCE]
             errors = [[motion, *_errors(found, others)] for motion, found in of.items()]
             bias = [[motion, *_thickening(found, names)] for motion, found in of.items()]
             heads = [f"true (px), `{REFERENCE}` (px)", *(f"`{name}`" for name in others)]
-            texts += [f"### {IMAGES[images]}", markdown(["motion", *heads], errors)]
+            texts += [f"### {IMAGES[str(images)]}", markdown(["motion", *heads], errors)]
             texts += [markdown(["motion", "true E_RR (%)", *(f"`{name}`" for name in names)], bias)]
         return "\n\n".join(texts)
 
@@ -311,7 +311,7 @@ def _errors(found: pd.DataFrame, others: list[str]) -> list[str]:
     """Cells of the errors of a motion."""
     error = found["error_px"]
     first = f"{number(found['motion_px'].iloc[0])}, {number(error[REFERENCE], 2)}"
-    return [first, *(number(error[name] / error[REFERENCE], 2) for name in others)]
+    return [first, *(number(error[name] / max(error[REFERENCE], LEAST_ERROR), 2) for name in others)]
 
 
 def _thickening(found: pd.DataFrame, names: list[str]) -> list[str]:

@@ -28,14 +28,14 @@ def hearts(repository):
 
 @pytest.mark.slow
 def test_network_beats_no_motion_on_a_heart_that_it_has_not_seen(repository, hearts):
-    found = example("motion")["compare"](repository, *hearts, epochs=40)
+    found = example("motion")["compare"](repository, *hearts, epochs=10)
     assert set(found) == {"no motion", "one", "network"}
-    assert found["network"] < 0.9 * found["no motion"]
+    assert found["network"] < 0.8 * found["no motion"]
 
 
 @pytest.mark.slow
 def test_wall_on_a_black_ground_is_found_by_a_network_and_better_than_by_its_mean_place(repository, hearts):
-    found = example("segmentation")["compare"](repository, *hearts, epochs=20)
+    found = example("segmentation")["compare"](repository, *hearts, epochs=10)
     assert found["network"] > 0.9 > found["mean wall"]
 
 
@@ -79,10 +79,11 @@ def rays(repository, hearts):
 @pytest.mark.slow
 def test_ray_network_learns_and_its_weights_give_the_tracker_what_pytorch_computed(rays, tmp_path):
     names, found = rays
-    network = names["train"](found, epochs=100)
-    names["calibrate"](network, found)
-    scores = names["scores"](network, found)
-    assert scores["name"].tolist() == [one.name for one in found] and scores["ratio"].mean() < 0.9
+    one = found[1:2]  # small, so that not all its points are right
+    network = names["train"](one, epochs=40)
+    names["calibrate"](network, one)
+    scores = names["scores"](network, one)
+    assert scores["name"].tolist() == [one[0].name] and scores["ratio"].mean() < 0.9
     assert scores["stated"].mean() == pytest.approx(scores["right"].mean(), abs=15)
     names["write"](network, found, tmp_path / "weights.npz")
     read_again = read(tmp_path / "weights.npz", len(names["CHANNELS"]))

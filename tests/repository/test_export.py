@@ -104,7 +104,7 @@ def test_waves_of_the_uff_focus_where_the_lines_do(folder, rf):
     assert abs(OFFSETS[int(np.argmax(levels))]) < 20e-6
 
 
-OFFSETS = np.arange(-300, 301, 5) * 1e-6
+OFFSETS = np.arange(-300, 301, 10) * 1e-6
 """Ranges about the brightest sample, m: some three lengths of the pulse on each side."""
 
 
