@@ -65,10 +65,10 @@ CORRECTION_WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 BONUS = 0.04
 """Largest loss of similarity at which the whole correction is still preferred to none; docs/tracking.md says on which
 clips it was chosen."""
-LEAST_CONTRACTION = 0.1
-"""Mean motion of the wall towards the cavity in the frame in which it is largest, over its thickness, below which the
-network is not used: it has learned from hearts that contract. Hearts have 0.2 or more, walls that rest, turn, twist or
-dilate 0.03 or less (docs/tracking.md)."""
+LEAST_CONTRACTION, LEAST_THICKENING = 0.1, 0.05
+"""Mean motion of the wall towards the cavity in the frame in which it is largest, over its thickness, and thickening of
+the wall then, below which the network is not used: it has learned from hearts that contract and thicken. Hearts have
+0.20 and 0.15 or more, walls that rest, turn, twist or dilate 0.03 or less (docs/tracking.md)."""
 LEAST_FRAMES = 6
 """Frames of a beat at least, of which 24 phases can be distinguished."""
 
@@ -134,20 +134,27 @@ def unknown_motion(clip: TrackerInput, features: RayFeatures) -> str:
     """Why a clip is none of those that the network knows, the beginning of a sentence; empty if it may be one."""
     if not clip.is_closed:
         return "the clip is no closed cycle"
-    if contraction(features) < LEAST_CONTRACTION * features.rays.thickness:
-        least = f"{100 * LEAST_CONTRACTION:.0f} % of its thickness"
+    inwards, thickening = contraction(features)
+    if inwards < LEAST_CONTRACTION or thickening < LEAST_THICKENING:
+        least = (
+            f"{100 * LEAST_CONTRACTION:.0f} % of its thickness, or thickens by less than {100 * LEAST_THICKENING:.0f} %"
+        )
         return f"since the first frame the wall moves inwards by less than {least}"
     if period := repetition(features.places().reshape(len(clip.frames), -1, 2)):
         return f"the motion comes again after {period} frames, and the clip has {len(clip.frames)}"
     return ""
 
 
-def contraction(features: RayFeatures) -> float:
-    """Mean motion of the wall towards the cavity, less that of the whole wall, in the frame of the largest, px."""
+def contraction(features: RayFeatures) -> tuple[float, float]:
+    """Largest mean motion of the wall towards the cavity, less that of the whole wall, over its thickness; and by what
+    share the wall is then thicker."""
     rays = features.rays
     moved = rays.in_image(features.displacement)[:, :, rays.crosses]
     moved = moved - moved.mean((1, 2), keepdims=True)
-    return float(-(moved * DIRECTIONS[rays.crosses]).sum(-1).mean((1, 2)).min())
+    along = (moved * DIRECTIONS[rays.crosses]).sum(-1)
+    outwards, apart = along.mean((1, 2)), (DEPTHS - 1) / DEPTHS * rays.thickness
+    frame = int(outwards.argmin())
+    return float(-outwards[frame] / rays.thickness), float((along[frame, -1] - along[frame, 0]).mean() / apart)
 
 
 def correction_weight(clip: TrackerInput, features: RayFeatures, step: np.ndarray) -> float:
