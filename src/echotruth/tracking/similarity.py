@@ -16,7 +16,7 @@ MAX_NCC = 0.9999
 """Correlation at most: images may be the same."""
 
 
-def even_contrast(frames: np.ndarray, thickness: float, window: float = WINDOW) -> list[np.ndarray]:
+def even_contrast(frames: np.ndarray, thickness: float) -> list[np.ndarray]:
     """Images of the same mean and contrast everywhere, lest a bright border that moves by itself outweighs speckle.
 
     Parameters
@@ -25,15 +25,13 @@ def even_contrast(frames: np.ndarray, thickness: float, window: float = WINDOW) 
         Grey values of any real type; NaN is taken as black.
     thickness : float
         Of the wall, px.
-    window : float
-        Standard deviation of the Gaussian of the local mean and contrast, over the thickness.
 
     Returns
     -------
     list of ndarray of shape (axial, lateral)
         Grey values less their local mean, over their local standard deviation, a number.
     """
-    return [_even(np.nan_to_num(frame), BLUR * thickness, window * thickness) for frame in grey_levels(frames)]
+    return [_even(np.nan_to_num(frame), BLUR * thickness, WINDOW * thickness) for frame in grey_levels(frames)]
 
 
 def _even(grey: np.ndarray, blur: float, window: float) -> np.ndarray:
