@@ -88,6 +88,13 @@ def sector(angle: Floats, width: float = np.pi / 3) -> Floats:
     return np.where(apart < 1, np.cos(np.pi / 2 * apart) ** 2, 0)
 
 
+def rotation(
+    turn: float, wall: Wall, radius: Floats, angle: Floats, random: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """The whole wall turns by an angle, rad."""
+    return 0 * radius, turn + 0 * angle
+
+
 def smooth_field(wall: Wall, radius: Floats, angle: Floats, random: np.random.Generator) -> tuple[Floats, Floats]:
     """Random harmonics 0 to 4 around and polynomials to the second degree through the wall."""
     depth, size = wall.depth(radius), 0.12 * (wall.outer - wall.inner)
@@ -104,7 +111,7 @@ def smooth_field(wall: Wall, radius: Floats, angle: Floats, random: np.random.Ge
 
 MOTIONS: dict[str, Polar] = {
     "still": lambda wall, r, a, random: (0 * r, 0 * a),
-    "rotation": lambda wall, r, a, random: (0 * r, TURN + 0 * a),
+    "rotation": partial(rotation, TURN),
     "twist by layer": lambda wall, r, a, random: (
         0 * r,
         TURN * (wall.depth(r) - 0.5),
@@ -288,7 +295,7 @@ def disk_rows(array: Array) -> list[Row]:
     )
     print(f"axis at {axis} px, {turn[1] / times[1]:.1f} rad/s, {np.degrees(turn[-1]):.1f} degrees")
     names = {"images": "disk", "motion": "rotation", "speckle": 1}
-    return ring_rows(names, frames, axis, partial(_turned, turn[-1]), times / times[-1])
+    return ring_rows(names, frames, axis, partial(rotation, turn[-1]), times / times[-1])
 
 
 def _likeness(frames: NDArray[np.uint8], inside: NDArray[np.bool_], turn: Floats, axis: Floats) -> float:
@@ -299,12 +306,6 @@ def _likeness(frames: NDArray[np.uint8], inside: NDArray[np.bool_], turn: Floats
         (one, cv2.warpAffine(other, back, one.shape[::-1])) for one, other in zip(frames, frames[later:], strict=False)
     )
     return float(np.mean([np.corrcoef(one[inside], other[inside])[0, 1] for one, other in pairs]))
-
-
-def _turned(
-    turn: float, wall: Wall, radius: Floats, angle: Floats, random: np.random.Generator
-) -> tuple[Floats, Floats]:
-    return 0 * radius, turn + 0 * angle
 
 
 def pymust_rows(array: Array, motion: str) -> list[Row]:

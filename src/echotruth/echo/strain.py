@@ -99,7 +99,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     points = _points(mask, spacing, scale)
     settings = _settings(tracker, options, scale)
     displacement, quality = track(frames, points, mask, spacing, clip["time"].values, 0, settings)
-    if plausibility.is_noise(frames, mask):
+    told = plausibility.doubts(frames, mask, spacing, settings)
+    if plausibility.NOISE in told:
         displacement[:], quality[:] = np.nan, np.nan
     position, moved = points * spacing, displacement * spacing
     depth, normal = wall.depth(points)
@@ -121,7 +122,7 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
         source=clip.attrs.get("source", ""),
         spacing=spacing,
     )
-    told = [*plausibility.doubts(frames, mask, spacing, settings), *doubts(data, wall.thickness() * spacing)]
+    told += doubts(data, wall.thickness() * spacing)
     return data.assign_attrs(notes="\n".join(told))
 
 
@@ -207,15 +208,13 @@ def _summary(curves: dict[str, Floats], moved: Floats, time: Floats, wall: Wall)
     """End-systole, global strain of the middle line there, and drift."""
     area, length = curves["cavity_area"], rms_length(moved)
     es = int(np.nanargmin(area)) if np.isfinite(area).any() else 0
-    largest = float(np.nanmax(length)) if np.isfinite(length).any() else 0.0
+    largest = float(np.nanmax(length)) if np.isfinite(length).any() else np.nan
     name = "gcs_percent" if wall.plane == "short_axis" else "gls_percent"
     return {
         "es_frame": es,
         "end_systole": float(time[es]),
         name: 100 * float(curves["line_strain"][es, 1]),
-        "drift_percent": 100 * float(length[-1]) / largest
-        if largest > 0
-        else (0.0 if np.isfinite(moved).any() else np.nan),
+        "drift_percent": 100 * float(length[-1]) / largest if largest != 0 else 0.0,
     }
 
 

@@ -80,8 +80,8 @@ def consecutive_correlation(frames: np.ndarray, mask: np.ndarray) -> float:
     No motion is undone: of a heart the frames in which it hardly moves resemble one another, of noise none do. NaN if
     all are even.
     """
-    known = np.nan_to_num(frames.astype(float), posinf=0.0, neginf=0.0)
-    wall = np.array([_even_contrast(frame)[mask] for frame in known])
+    grey = np.nan_to_num(frames.astype(float), posinf=0.0, neginf=0.0)
+    wall = np.array([_even_contrast(frame)[mask] for frame in grey])
     wall -= wall.mean(1, keepdims=True)
     power, product = (wall**2).sum(1), (wall[1:] * wall[:-1]).sum(1)
     known = (power[1:] > 0) & (power[:-1] > 0)
