@@ -1,4 +1,4 @@
-"""A repository as the files that one would upload: parts with their checksums, a card and metadata."""
+"""A repository as the files that one would upload: parts with their checksums, a card, a citation and tables."""
 
 from pathlib import Path
 from typing import Any
@@ -7,14 +7,13 @@ import yaml
 
 from echotruth import files
 from echotruth.repository.reader import Repository
-from echotruth.sharing.description import documents
-from echotruth.sharing.description.attribution import Attribution
-from echotruth.sharing.description.citation import filled
-from echotruth.sharing.description.facts import Facts, read_facts
-from echotruth.sharing.description.statements import statements
 from echotruth.sharing.export.destination import draft
 from echotruth.sharing.fetching import PARTS, REGISTRY
+from echotruth.sharing.release.attribution import Attribution
+from echotruth.sharing.release.citation import citation, filled
+from echotruth.sharing.release.facts import CLIPS, Facts, ReleaseError, read_facts
 from echotruth.sharing.release.parts import Part, registry, table, write_parts
+from echotruth.sharing.release.statements import card, statements
 
 PART_BYTES = 2 * 10**9
 """Largest size of a part unless another is asked for."""
@@ -22,10 +21,6 @@ HUB_TASKS = ["image-segmentation", "keypoint-detection"]
 """What Hugging Face calls the tasks that the truth is for."""
 HUB_SIZES = {1_000: "n<1K", 10_000: "1K<n<10K", 100_000: "10K<n<100K", 1_000_000: "100K<n<1M"}
 """Number of clips -> what Hugging Face calls fewer."""
-
-
-class ReleaseError(ValueError):
-    """Raised if a repository cannot be released; the message says why, and what to do."""
 
 
 def release(
@@ -51,8 +46,8 @@ def release(
 
     Raises
     ------
-    ReleaseError, DescriptionError
-        If the repository is not finished or is damaged, the folder is there already, or a package is missing.
+    ReleaseError
+        If the repository is not finished or is damaged, or the folder is there already.
     """
     if folder.exists() or folder.is_symlink():
         raise ReleaseError(f"{folder}: is there already: give another folder with --to, or remove it")
@@ -70,11 +65,12 @@ def release(
 def _documents(facts: Facts, found: list[Part]) -> dict[str, bytes]:
     """Content of the files beside the parts, by their names."""
     said = statements(facts)
-    texts = documents(facts, said, [(part.path.name, part.bytes, part.sha256) for part in found])
     hub = yaml.safe_dump(_hub(facts, said), sort_keys=False, allow_unicode=True)
-    return texts | {
+    return {
+        CLIPS: facts.clips_table,
+        "CITATION.cff": citation(facts, said),
         PARTS: table(found),
-        "README.md": f"---\n{hub}---\n\n".encode() + texts["README.md"],
+        "README.md": f"---\n{hub}---\n\n".encode() + card(facts, said),
         "cases.csv": (facts.repository.folder / "cases.csv").read_bytes(),
     }
 

@@ -8,7 +8,6 @@ All parts are unpacked into the same folder. Times are left out, so that the sam
 import csv
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
 from hashlib import sha256
 from io import StringIO
 from pathlib import Path, PurePosixPath
@@ -19,12 +18,10 @@ from echotruth.repository.checksums import CHECKSUMS, checksum
 from echotruth.repository.places import DEPTHS
 from echotruth.repository.publication import published_checksums
 from echotruth.repository.reader import Repository
+from echotruth.sharing.fetching import HEARTS, STRUCTURE
 
-STRUCTURE, HEARTS = "structure", "hearts"
-"""What a part holds."""
-
-Files = dict[str, bytes | Path]
-"""Name in an archive -> content, or the file that has it."""
+Files = dict[str, Path]
+"""Name in an archive -> the file."""
 
 
 @dataclass
@@ -50,25 +47,15 @@ class Part:
     def add(self, cases: list[str], files: Files) -> None:
         """Append files of some cases, given their names in the archive."""
         with ZipFile(self.path, "a") as archive:
-            for name, content in files.items():
-                append(archive, name, content if isinstance(content, bytes) else content.read_bytes())
+            for name, file in files.items():
+                append(archive, name, file.read_bytes())
         self.size += size_of(files)
         self.cases += [case for case in cases if case not in self.cases]
-
-    @property
-    def bytes(self) -> int:
-        """Size of the archive."""
-        return self.path.stat().st_size
-
-    @cached_property
-    def sha256(self) -> str:
-        """Checksum of the archive, to be asked for once it is full."""
-        return checksum(self.path)
 
 
 def size_of(files: Files) -> int:
     """Size of files, bytes."""
-    return sum(len(one) if isinstance(one, bytes) else one.stat().st_size for one in files.values())
+    return sum(file.stat().st_size for file in files.values())
 
 
 def write_parts(repository: Repository, folder: Path, limit: int) -> list[Part]:
@@ -143,6 +130,6 @@ def table(found: list[Part]) -> bytes:
 
 def registry(found: list[Part], texts: dict[str, bytes]) -> bytes:
     """Checksums of all files, as pooch reads them."""
-    known = {part.path.name: part.sha256 for part in found}
+    known = {part.path.name: checksum(part.path) for part in found}
     known |= {name: sha256(content).hexdigest() for name, content in texts.items()}
     return "".join(f"{name} sha256:{one}\n" for name, one in known.items()).encode()

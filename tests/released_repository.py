@@ -5,7 +5,7 @@ from pathlib import Path
 
 from finished_repository import begin, blank, configured, do, finish, jobs
 
-from echotruth.sharing.description.attribution import Attribution, Author
+from echotruth.sharing.release.attribution import Attribution, Author
 from echotruth.workflow.failure import CaseFailed
 
 SWEEP = {"fibres.endo_deg": [60.0, 70.0]}
@@ -19,7 +19,7 @@ CHANGED = 1_700_003_600
 
 
 def make_finished(folder: Path) -> Path:
-    """A finished repository, not described."""
+    """A finished repository."""
     finish(folder, configured(cases=SWEEP))
     os.utime(folder / "SHA256SUMS", (CHANGED, CHANGED))
     return folder

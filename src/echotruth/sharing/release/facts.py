@@ -1,36 +1,25 @@
-"""What is to be known of a finished repository to describe it, and the table of its clips."""
+"""What is to be known of a finished repository to release it, and the table of its clips."""
 
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from functools import cached_property
-from importlib.util import find_spec
 from typing import Any
 
 import pandas as pd
 
-from echotruth.extras import installation
 from echotruth.repository.check import check
 from echotruth.repository.checksums import CHECKSUMS
 from echotruth.repository.reader import Repository
 from echotruth.repository.status import ALWAYS, is_label
-from echotruth.sharing.description.attribution import Attribution, Author
 from echotruth.sharing.export.clip import ExportedClip
+from echotruth.sharing.release.attribution import Attribution, Author
 
 CLIPS = "clips.csv"
-COLUMNS = {
-    "case": "id of the case, as in cases.csv",
-    "view": "name of the view",
-    "size_px": "pixels along a side",
-    "frames": "number of frames, the first at end-diastole",
-    "frame_time_s": "time from one frame to the next, s",
-    "pixel_m": "height and width of a pixel, m",
-    "array": "path of the array in the store",
-}
-"""Column of the table of clips -> what it holds."""
+"""Name of the table of clips: case, view, size, frames, time and pixel in SI, and path of the images in the store."""
 
 
-class DescriptionError(ValueError):
-    """Raised if a repository cannot be described."""
+class ReleaseError(ValueError):
+    """Raised if a repository cannot be released; the message says why, and what to do."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +43,7 @@ class Facts:
     @property
     def published(self) -> date:
         """Day of publication."""
-        return self.attribution.published or self.ended.date()
+        return self.ended.date()
 
     @property
     def packages(self) -> dict[str, str]:
@@ -74,25 +63,29 @@ class Facts:
         clips = [
             ExportedClip(self.repository, case, view, size) for case, views in found for view in views for size in sizes
         ]
-        return pd.DataFrame(map(_row, clips), columns=list(COLUMNS)).to_csv(index=False).encode()
+        return pd.DataFrame(map(_row, clips)).to_csv(index=False).encode()
 
 
 def read_facts(repository: Repository, given: Attribution) -> Facts:
-    """Read what is to be known of a repository; DescriptionError if it is not finished, or cannot be described."""
-    if find_spec("mlcroissant") is None:
-        raise DescriptionError(f"a description needs the package mlcroissant: {installation('description')}")
+    """Read what is to be known of a repository; ReleaseError if it is not finished, or damaged."""
     folder, report = repository.folder, check(repository.folder, quick=True)
     unpublished = [] if (folder / CHECKSUMS).is_file() else report.notes
     if problems := [*unpublished, *map(str, report.faults)]:
         remedy = f"run its configuration to its end; echotruth check {folder} lists all faults"
-        raise DescriptionError(f"{folder}: is not finished, or damaged ({problems[0]}): {remedy}")
+        raise ReleaseError(f"{folder}: is not finished, or damaged ({problems[0]}): {remedy}")
     authors = given.authors or (Author(f"The authors of the repository {repository.config.name}"),)
     # Whole seconds, so that file systems that keep no fractions give the same.
     ended = datetime.fromtimestamp(int((folder / CHECKSUMS).stat().st_mtime), UTC)
     return Facts(repository, given._replace(authors=authors), ended)
 
 
-def _row(clip: ExportedClip) -> tuple[Any, ...]:
-    path = clip.repository.path(f"bmode/{clip.size}/image", clip.case.id, clip.view)
-    times = len(clip.time), f"{clip.frame_time:.9g}"
-    return clip.case.id, clip.view, clip.size, *times, f"{clip.spacing:.9g}", path
+def _row(clip: ExportedClip) -> dict[str, Any]:
+    return {
+        "case": clip.case.id,
+        "view": clip.view,
+        "size_px": clip.size,
+        "frames": len(clip.time),
+        "frame_time_s": f"{clip.frame_time:.9g}",
+        "pixel_m": f"{clip.spacing:.9g}",
+        "array": clip.repository.path(f"bmode/{clip.size}/image", clip.case.id, clip.view),
+    }

@@ -1,6 +1,5 @@
 """Who made a repository, and under which terms it is given away: what no file of it says."""
 
-from datetime import date
 from typing import NamedTuple
 
 
@@ -19,14 +18,13 @@ class Author(NamedTuple):
 
 
 class Attribution(NamedTuple):
-    """What is to be said of a repository beyond its content; of a day, None stands for that of its publication."""
+    """What is to be said of a repository beyond its content."""
 
     authors: tuple[Author, ...] = ()
     spdx: str = ""
     terms: str = ""
     url: str = ""
     release: str = "1.0.0"
-    published: date | None = None
 
     @property
     def licence(self) -> str:

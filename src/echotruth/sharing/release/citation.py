@@ -5,11 +5,8 @@ from typing import Any
 import yaml
 
 from echotruth.config import shipped
-from echotruth.sharing.description.attribution import Author
-from echotruth.sharing.description.facts import Facts
-
-MARK = "# Made by echotruth describe.\n"
-"""First line, by which the file is known as one that may be replaced."""
+from echotruth.sharing.release.attribution import Author
+from echotruth.sharing.release.facts import Facts
 
 
 def citation(facts: Facts, said: dict[str, Any]) -> bytes:
@@ -30,7 +27,7 @@ def citation(facts: Facts, said: dict[str, Any]) -> bytes:
         "url": given.url,
         "references": [software | filled(version=facts.packages.get("echotruth")), own["preferred-citation"]],
     }
-    return (MARK + yaml.safe_dump(filled(**document), sort_keys=False, allow_unicode=True, width=100)).encode()
+    return yaml.safe_dump(filled(**document), sort_keys=False, allow_unicode=True, width=100).encode()
 
 
 def filled(**entries: object) -> dict[str, Any]:

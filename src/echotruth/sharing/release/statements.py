@@ -1,4 +1,4 @@
-"""What the documents of a repository say of it in words; the words are in statements.yaml.jinja and README.md.jinja."""
+"""What the documents of a release say of it in words; the words are in statements.yaml.jinja and README.md.jinja."""
 
 import json
 from functools import partial
@@ -10,11 +10,9 @@ import yaml
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from echotruth.config import Config, shipped
-from echotruth.sharing.description.facts import Facts
+from echotruth.sharing.release.facts import Facts
 from echotruth.units import unit_of
 
-MARK = "<!-- Made by echotruth describe. -->\n"
-"""First line of the data card, by which the file is known as one that may be replaced."""
 SHIPPED_LOOPS = ("mouse", "rat", "human", "twitch")
 """Loops that are part of echotruth; others are files of the user."""
 FEATURES = {
@@ -44,10 +42,10 @@ def statements(facts: Facts) -> dict[str, Any]:
     return found | {"collection": " ".join(found["collection"])}
 
 
-def card(facts: Facts, said: dict[str, Any], is_release: bool = False) -> bytes:
-    """README.md of a repository, its data card, for its folder or for a release, given the statements on it."""
-    text = _rendered("README.md.jinja", facts=facts, said=said, is_release=is_release, unit_of=unit_of)
-    return (MARK + text.rstrip() + "\n").encode()
+def card(facts: Facts, said: dict[str, Any]) -> bytes:
+    """README.md of a release, its data card, given the statements on it."""
+    text = _rendered("README.md.jinja", facts=facts, said=said, unit_of=unit_of)
+    return (text.rstrip() + "\n").encode()
 
 
 def _rendered(name: str, **context: object) -> str:

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import pandas as pd
 
 from echotruth.config import Config
-from echotruth.sharing.description.attribution import Attribution, Author
-from echotruth.sharing.description.statements import statements
+from echotruth.sharing.release.attribution import Attribution, Author
+from echotruth.sharing.release.statements import statements
 
 
 def facts(*settings, statuses=("complete",), swept=()):
