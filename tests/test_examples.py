@@ -92,7 +92,7 @@ def test_block_of_the_page_about_motion_from_files_runs_on_a_series(tmp_path, mo
         nodes = 1e3 * coarse_mesh.nodes * (1 - a * np.array([0.2, 0.2, 0.1]))
         pyvista.UnstructuredGrid({24: coarse_mesh.cells.astype(np.int64)}, nodes).save(f"heart_{frame}.vtu")
     page, names = (EXAMPLES.parent / "docs/motion.md").read_text(), {}
-    (block,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    block, _ = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     exec(block, names)
     volume = names["heart"].arrays["mechanics"]["volume"]
     assert volume[4] / volume[0] == pytest.approx(0.8 * 0.8 * 0.9, rel=1e-6)

@@ -91,7 +91,7 @@ def changed(monkeypatch, change, **settings):
         ("mechanics/solver/newton.py", set(OF_VIEW)),
         ("materials/fung.py", set(OF_VIEW)),
         ("materials/neo_hooke.py", set()),
-        ("mechanics/motion_file/xdmf.py", set()),
+        ("mechanics/motion_file/series.py", set()),
         ("mechanics/geometry/remeshing.py", set()),
         ("repository/group.py", set()),
         ("repository/rounding.py", set(OF_VIEW)),

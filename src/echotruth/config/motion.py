@@ -69,7 +69,7 @@ class FileMotion(Section):
 
     path: str | None = None
     """The series: files in one pattern (`heart_*.vtk`, also .vtu, .pvtu, .msh), in the order of the numbers in their
-    names; a .pvd or .xdmf file; or positions of the points of `geometry.file`, of shape (frame, point, 3), as .npy, or
+    names; a .pvd file; or positions of the points of `geometry.file`, of shape (frame, point, 3), as .npy, or
     as .npz with the array `positions` and, optionally, `times`. The unit of all lengths is `geometry.unit` times
     `geometry.scale`."""
     displacement: str | None = None
@@ -77,7 +77,7 @@ class FileMotion(Section):
     points themselves move."""
     times: Annotated[list[FiniteFloat], Field(min_length=2)] | None = None
     """Time of each frame of the series, in any unit, because one cycle takes 60 s / `loop.heart_rate_per_min`.
-    Default: the times in the .pvd, .xdmf or .npz file, or equal steps."""
+    Default: the times in the .pvd or .npz file, or equal steps."""
     frames: Annotated[list[FrameNumber], Field(min_length=2, max_length=2)] | None = None
     """First and last frame of the cycle, counted from 0 in the series. Default: all."""
     repeats_first: bool | None = None

@@ -1,4 +1,4 @@
-"""Files of a series: those that a pattern matches, those that a .pvd or .xdmf file names, and the hash of all."""
+"""Files of a series: those that a pattern matches, those that a .pvd or .pvtu file names, and the hash of all."""
 
 import glob
 import re
@@ -11,9 +11,7 @@ from echotruth.mechanics.prescribed import MotionError
 _NAMED = {
     ".pvd": re.compile(r'file\s*=\s*["\']([^"\']+)["\']'),
     ".pvtu": re.compile(r'Source\s*=\s*["\']([^"\']+)["\']'),
-    ".xdmf": re.compile(r">\s*([^<>\n]+?\.(?:h5|hdf5|hdf|bin))\b", re.IGNORECASE),
 }
-_NAMED[".xmf"] = _NAMED[".xdmf"]
 """Suffix of a file -> other files that it names."""
 
 

@@ -14,11 +14,10 @@ from echotruth.config.motion import FileMotion
 from echotruth.mechanics.geometry.imported_mesh import ImportedMesh, read_files
 from echotruth.mechanics.geometry.mesh_quality import GeometryError
 from echotruth.mechanics.motion_file.files import series_files
-from echotruth.mechanics.motion_file.xdmf import read_xdmf
 from echotruth.mechanics.prescribed import MotionError
 
 MESH_SUFFIXES = (".vtk", ".vtu", ".pvtu", ".msh")
-PVD_SUFFIXES, XDMF_SUFFIXES = (".pvd",), (".xdmf", ".xmf")
+COLLECTION = ".pvd"
 
 STILL = 1e-9
 """Motion over the size of the heart below which points are at rest."""
@@ -51,7 +50,7 @@ class MeshSeries:
 def is_series(path: str) -> bool:
     """Whether a path is that of a series, not of a single mesh."""
     pattern = glob.has_magic(path) and not Path(path).is_file()
-    return pattern or Path(path).suffix.lower() in (*PVD_SUFFIXES, *XDMF_SUFFIXES)
+    return pattern or Path(path).suffix.lower() == COLLECTION
 
 
 def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries:
@@ -79,7 +78,7 @@ def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries
     try:
         if suffix in ARRAY_SUFFIXES:
             return _array_series(source, section.displacement, points)
-        frames, times = _mesh_frames(files, suffix, section.displacement)
+        frames, times = _mesh_frames(files, suffix)
     except (MotionError, GeometryError):
         raise
     except Exception as error:  # the libraries do not document what they raise
@@ -88,14 +87,12 @@ def read_series(section: FileMotion, points: Floats | None = None) -> MeshSeries
     return _stack(source, frames, np.array(times, float) if times else None, section.displacement)
 
 
-def _mesh_frames(files: list[Path], suffix: str, displacement: str | None) -> tuple[list[ImportedMesh], list[float]]:
+def _mesh_frames(files: list[Path], suffix: str) -> tuple[list[ImportedMesh], list[float]]:
     if suffix in MESH_SUFFIXES:
         return read_files([str(file) for file in files]), []
-    if suffix in PVD_SUFFIXES:
+    if suffix == COLLECTION:
         return _pvd_frames(files[0])
-    if suffix in XDMF_SUFFIXES:
-        return read_xdmf(files[0], displacement)
-    known = ", ".join((*MESH_SUFFIXES, *PVD_SUFFIXES, *XDMF_SUFFIXES, *ARRAY_SUFFIXES))
+    known = ", ".join((*MESH_SUFFIXES, COLLECTION, *ARRAY_SUFFIXES))
     raise MotionError(f"motion.file.path = {str(files[0])!r}: ends in {suffix or 'no suffix'}: give one of {known}.")
 
 
