@@ -1,7 +1,6 @@
 """`echotruth info`: what it tells is what is there."""
 
 import platform
-import re
 import shutil
 from importlib.metadata import version
 
@@ -20,30 +19,19 @@ def finished(tmp_path_factory):
     return folder
 
 
-def told(output):
-    """Name -> text of each line."""
-    return dict(re.split(r"  +", line, maxsplit=1) for line in output.splitlines() if re.search(r"^\S.*?  +\S", line))
-
-
 def test_installation_is_told(call):
     status, output, errors = call("info")
-    found = told(output)
     assert (status, errors) == (0, "")
-    assert found["echotruth"].startswith(echotruth.__version__) and found["Python"].startswith(
-        platform.python_version()
-    )
-    assert f"numpy {version('numpy')}" in found["packages"]
+    ours, python, others = output.splitlines()
+    assert ours.startswith(f"echotruth {echotruth.__version__}, ")
+    assert python.startswith(f"Python {platform.python_version()} on ")
+    assert f"numpy {version('numpy')}" in others
 
 
-@pytest.mark.slow
-def test_repository_is_told_and_opens_as_it_says(call, finished):
+def test_repository_is_told(call, finished):
     status, output, errors = call("info", finished)
-    found = told(output)
     assert (status, errors) == (0, "")
-    assert (found["cases"], found["views"], found["trackers"]) == ("2: 2 complete", "1: mid (short axis)", "one")
-    assert found["sizes"].startswith("64 px") and found["name"] == "small, seed 1"
-    files = [path for path in finished.rglob("*") if path.is_file()]
-    assert f"{sum(path.stat().st_size for path in files) / 2**20:.1f} MiB in {len(files)} files" == found["on disk"]
+    assert output.startswith(str(echotruth.Repository(finished))) and "2 complete" in output
 
 
 def test_repository_opens_as_it_is_told(call, known):
@@ -54,11 +42,10 @@ def test_repository_opens_as_it_is_told(call, known):
     np.testing.assert_array_equal(found["clip"]["image"].values, known.images(known_repository.SIZES[0]))
 
 
-def test_repository_that_no_run_has_published_is_told_so(call, tmp_path):
+def test_repository_that_no_run_has_finished_is_told_so(call, tmp_path):
     finished_repository.begin(tmp_path / "small", finished_repository.configured(seeds=(1, 2, 3)))
     status, output, _ = call("info", "small")
-    found = told(output)
-    assert status == 0 and found["cases"] == "3: 3 unfinished" and "not published" in found["made by"]
+    assert status == 0 and "3 unfinished" in output
     assert 'repository = et.Repository("small")' in output and "clip" not in output
 
 
