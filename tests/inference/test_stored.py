@@ -98,12 +98,15 @@ def test_check_tells_from_what_cannot_be_inferred(inference, said):
 def test_prior_of_the_configuration_is_that_of_what_is_inferred(monkeypatch):
     given = {"fibres.endo_deg": [75.0, 3.0], "mechanics.regional.stiffness": None}
     config = et.configure(et.configure(CONFIG, inference={"prior": given}), seed=2)  # null is kept in another one too
-    asked = []
+
+    def infer(_, prior, **__):
+        raise LookupError(prior)
+
     monkeypatch.setattr(stored, "observe", lambda *_: None)
-    monkeypatch.setattr(stored, "infer", lambda _, prior, **__: asked.append(prior))
-    monkeypatch.setattr(stored, "_groups", lambda *_: {})
-    stored.stored(None, SimpleNamespace(id="heart", config=config))
-    assert asked == [given]
+    monkeypatch.setattr(stored, "infer", infer)
+    with pytest.raises(LookupError) as asked:
+        stored.stored(None, SimpleNamespace(id="heart", config=config))
+    assert asked.value.args == (given,)
 
 
 def test_hearts_of_a_sweep_are_inferred_alike():

@@ -5,6 +5,7 @@ from functools import partial
 
 import finished_repository as finished
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 
@@ -156,7 +157,7 @@ def test_heart_of_which_nothing_can_be_inferred_is_told_and_the_others_stay(fold
 
 def test_table_of_a_repository_of_which_nothing_was_inferred_is_read_and_shown_as_none(folder, tmp_path):
     repository, path = Repository(folder), tmp_path / inferred.FILE
-    inferred.write(path, inferred.table_of([]))
+    inferred.write(path, pd.DataFrame(columns=list(inferred.COLUMNS)))
     found = inferred.read(path)
     assert found.empty and inferred.shown(repository, found) == ""
     assert account.inference(repository, found)["hearts"] == []

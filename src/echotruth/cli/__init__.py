@@ -11,7 +11,7 @@ from echotruth.workflow.lock import LockError
 
 COMMANDS = (
     *("new", "check", "cases", "run", "status", "info", "show"),
-    *("draw", "track", "evaluate", "infer", "export", "release", "merge"),
+    *("draw", "track", "evaluate", "export", "release", "merge"),
 )
 """Commands, and their modules and functions, in the order of `echotruth --help`."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ from echotruth.inference.estimate import infer
 from echotruth.inference.imaged_wall import ROTATION
 from echotruth.inference.observation import observe, seen_of
 from echotruth.inference.truth import truth
-from echotruth.repository import inferred, schema
+from echotruth.repository import schema
 from echotruth.repository.reader import Repository
 
 Groups = dict[str, dict[str, Any]]
@@ -32,30 +31,7 @@ def stored(repository: Repository, case: Case) -> Groups:
     """
     section = case.config.inference
     observed = observe(repository, section.tracker, case.id, section.size_px, section.errors)
-    return _groups(repository, case, infer(observed, section.prior, progress=False))
-
-
-def rows(
-    repository: Repository, tracker: str | None, case: str, size: int | None, errors: Path | None
-) -> list[dict[str, Any]]:
-    """Infer a heart of a repository as is asked for, and give its rows of the table of what was inferred.
-
-    Parameters, errors
-        Those of :func:`.observation.observe` and :func:`.estimate.infer`.
-
-    Returns
-    -------
-    list of dict
-        Of each parameter its values, by the names of :data:`.inferred.COLUMNS`.
-    """
-    observed, of = observe(repository, tracker, case, size, errors), repository.case(case)
-    found = _groups(repository, of, infer(observed, of.config.inference.prior))
-    about = {name: observed.attrs[name] for name in ("case", "tracker", "size_px")}
-    return [about | row for row in inferred.rows(found["inference/fit"])]
-
-
-def _groups(repository: Repository, case: Case, found: xr.Dataset) -> Groups:
-    """Arrays of the groups, beside what is true of the heart."""
+    found = infer(observed, section.prior, progress=False)
     seen = seen_of(repository, case, found.attrs["tracker"], found.attrs["size_px"])
     true = {
         _label(one.view, number): value for one in seen for number, value in zip(one.segments, one.true, strict=True)

@@ -55,7 +55,8 @@ def table(repository: Repository) -> pd.DataFrame:
     config, section = repository.config, repository.config.inference
     about = {"tracker": section.tracker, "size_px": image_size(config, section.size_px)}
     fits = {case: repository.arrays("inference/fit", case) for case in hearts(repository)}
-    return table_of([{"case": case} | about | row for case, fit in fits.items() for row in rows(fit)])
+    found = [{"case": case} | about | row for case, fit in fits.items() for row in rows(fit)]
+    return pd.DataFrame(found, columns=list(COLUMNS))
 
 
 def write(path: Path, table: pd.DataFrame) -> None:
@@ -74,11 +75,6 @@ def shown(repository: Repository, table: pd.DataFrame) -> str:
     which something was; empty if there is none."""
     cases = list(table["case"].unique())
     return next((str(case) for case in (*repository.shown[:1], *cases) if case in cases), "")
-
-
-def table_of(found: list[dict[str, Any]]) -> pd.DataFrame:
-    """Table of rows, which may be none."""
-    return pd.DataFrame(found, columns=list(COLUMNS))
 
 
 def rows(fit: dict[str, Any]) -> list[dict[str, Any]]:
