@@ -1,4 +1,4 @@
-"""Jobs use one set of instructions, so that machines of several kinds give the same bytes, and records say which."""
+"""Jobs use one set of instructions, so that machines of several kinds give the same bytes."""
 
 import json
 import os
@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from echotruth.workflow import instructions
-from echotruth.workflow.instructions import LEVEL, environment, exports, kind
+from echotruth.workflow.instructions import LEVEL, environment, exports
 
 needs_level = pytest.mark.skipif(not environment(), reason=f"this processor has no {LEVEL}")
 
@@ -50,30 +50,12 @@ def test_numpy_openblas_and_opencv_have_no_code_beyond_the_level():
     assert "AVX2" in ipp
 
 
-@needs_level
-def test_kind_is_the_level_in_a_job_and_the_processor_elsewhere():
-    code = "from echotruth.workflow.instructions import kind; print(kind())"
-    assert in_job(code).startswith(LEVEL)
-    result = subprocess.run([sys.executable, "-c", code], env=clean_environment(), check=True, capture_output=True)
-    assert result.stdout.decode().startswith("native ")
-
-
 @pytest.mark.parametrize("cpuinfo", ["", "flags\t: fpu avx fma abm f16c\n", "Features\t: fp asimd\n"])
-def test_processor_without_the_level_keeps_its_own_instructions_and_is_named(monkeypatch, tmp_path, cpuinfo):
+def test_processor_without_the_level_keeps_its_own_instructions(monkeypatch, tmp_path, cpuinfo):
     (tmp_path / "cpuinfo").write_text(f"processor\t: 0\n{cpuinfo}")
     monkeypatch.setattr(instructions, "_CPUINFO", tmp_path / "cpuinfo")
     assert environment() == {}
     assert exports() == ""
-    assert kind.__wrapped__().startswith("native ")
-
-
-@needs_level
-@pytest.mark.parametrize("processor, expected", [("znver3", f"{LEVEL}, MKL for znver3"), ("skylake-avx512", LEVEL)])
-def test_kind_names_the_processor_where_mkl_has_no_fixed_branch(monkeypatch, processor, expected):
-    monkeypatch.setattr("llvmlite.binding.get_host_cpu_name", lambda: processor)
-    for name, value in environment().items():
-        monkeypatch.setenv(name, value)
-    assert kind.__wrapped__() == expected
 
 
 def test_wider_vectors_of_opencv_are_disabled_only_where_there_are_some(monkeypatch):

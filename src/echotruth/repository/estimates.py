@@ -24,11 +24,6 @@ class NotEvaluated(ValueError):
     """Raised if a tracker was not run on a clip."""
 
 
-def settings(repository: Repository, tracker: str) -> dict[str, Any]:
-    """Settings of a tracker of a repository."""
-    return repository.config.tracking.trackers[tracker].model_dump(mode="json")
-
-
 def true(repository: Repository, case: str, view: str, *names: str) -> Arrays:
     """Arrays that do not depend on the tracker, for one view of a case.
 

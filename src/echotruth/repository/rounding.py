@@ -4,7 +4,6 @@ The bits below the quantum are zero, and so take next to no place once they are 
 floating-point numbers, which every reader reads; rounding moves each by half its quantum at most.
 """
 
-from dataclasses import replace
 from math import floor, log2
 from typing import Any, cast
 
@@ -39,11 +38,6 @@ def length_quantum(config: Config) -> float:
     """Largest power of two that is not above 1/256 of the pixel of the largest image, m."""
     pixel = config.bmode.field_of_view_mm * mm / max(config.bmode.sizes)
     return float(2.0 ** floor(log2(pixel / 256)))
-
-
-def of(arrays: tuple[Array, ...], config: Config) -> tuple[Array, ...]:
-    """Arrays with each quantum as a number."""
-    return tuple(replace(array, quantum=quantum(array, config)) for array in arrays)
 
 
 def as_stored(values: ArrayLike, array: Array, config: Config) -> NDArray[Any]:

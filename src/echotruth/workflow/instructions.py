@@ -6,8 +6,6 @@ level of the System V ABI, AMD64 supplement), and no others. MKL is set in :mod:
 branch on Intel's processors only. docs/determinism.md says what was measured.
 """
 
-import os
-from functools import cache
 from pathlib import Path
 from shlex import quote
 
@@ -17,9 +15,6 @@ _FLAGS = {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe"}
 """Flags of the level by their names in Linux; older levels are implied."""
 
 _CPUINFO = Path("/proc/cpuinfo")
-
-_AMD = ("znver", "bdver", "btver", "amdfam")
-"""Beginnings of LLVM's names of AMD's processors."""
 
 
 def environment() -> dict[str, str]:
@@ -52,24 +47,6 @@ def exports() -> str:
     """Shell command that exports :func:`environment`; empty if there is nothing to set."""
     variables = environment()
     return f"export {' '.join(f'{name}={quote(value)}' for name, value in variables.items())}; " if variables else ""
-
-
-@cache
-def kind() -> str:
-    """Instructions that this process uses; results of one kind agree byte for byte.
-
-    Returns
-    -------
-    str
-        `x86-64-v3`; with the processor's name after it where MKL takes whatever that processor offers; or `native` and
-        the name where all libraries do.
-    """
-    import llvmlite.binding
-
-    variables, processor = environment(), llvmlite.binding.get_host_cpu_name()
-    if not variables or any(os.environ.get(name) != value for name, value in variables.items()):
-        return f"native {processor}"
-    return f"{LEVEL}, MKL for {processor}" if processor.startswith(_AMD) else LEVEL
 
 
 def _processor_flags() -> set[str]:
