@@ -46,7 +46,7 @@ AS_AT_FIRST = """() => {
     const model = name => Bokeh.documents[0].get_model_by_name(name);
     const first = {view: "mid", size: "128", other: "", colour: "none"};
     for (const [name, value] of Object.entries(first)) model(name).value = value;
-    model("arrows").active = [];
+    model("paths").active = [];
     model("frame").value = 0;
     for (const value of [1, 0]) model("frame").value_throttled = value;  // also where playing has left it
 }"""

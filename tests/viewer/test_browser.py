@@ -8,7 +8,7 @@ from known_repository import FRAMES, SIZES, known_images
 from matplotlib.colors import to_rgb
 from PIL import Image
 
-from echotruth.viewer.panel import ARROWS
+from echotruth.viewer.panel import PATHS
 from echotruth.viewer.tint import COLOURS
 
 pytestmark = pytest.mark.slow
@@ -103,7 +103,7 @@ def test_paths_appear_and_disappear_by_a_click(page):
             page.get_by_text(f"{kind} paths", exact=True).click()
             wait(page, f"(({MODEL})('{kind}_first').data.x0.length > 0) === {str(shown).lower()}")
             page.wait_for_timeout(500)
-            assert (pixels_of(screenshot(page), ARROWS[kind]) > 50) is shown
+            assert (pixels_of(screenshot(page), PATHS[kind]) > 50) is shown
 
 
 def test_second_tracker_has_a_picture_and_a_curve_of_its_own(page):

@@ -153,16 +153,16 @@ def test_added_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_
     assert len(list(run.rows(run.case_views([], ["mid"])))) == len(SIZES)
     repository = Repository(folder)
     page = Page(repository, first(repository), "", Document())
-    page.arrows.active = [1]
+    page.paths.active = [1]
     choose(page, tracker="outside", colour="displacement_error")
     assert "outside has no estimate of this strain" in page.message.text  # the contours of this wall are made up
     assert page.graphs["strain"].source.data["y1"].shape == (3,)
     assert page.panels[0].colour.data["index"][0].any()
-    start, end = (page.panels[0].movements["tracked"].data[name].reshape(3, -1) for name in ("x0", "x1"))
-    np.testing.assert_allclose(np.nanmax(end[-1] - start[0]), 1e3 * 2 * 12e-3 / SIZES[0], rtol=1e-3)
+    lateral = page.panels[0].positions["tracked"].data["x"].reshape(3, -1)
+    np.testing.assert_allclose(np.nanmax(lateral[-1] - lateral[0]), 1e3 * 2 * 12e-3 / SIZES[0], rtol=1e-3)
     choose(page, view="long")
     assert "no tracking/outside of heart long" in page.message.text and "not evaluated on this clip" in page.facts.text
-    assert not page.panels[0].colour.data["index"][0].any() and not page.panels[0].movements["tracked"].data["x0"].size
+    assert not page.panels[0].colour.data["index"][0].any() and not page.panels[0].positions["tracked"].data["x"].size
 
 
 @pytest.mark.slow

@@ -6,8 +6,9 @@ from known_repository import FRAMES, SIZES
 from known_repository import SHIFT as MOTION
 from shown_repository import PIXEL, SHIFT
 
-from echotruth.viewer import arrows, curves
+from echotruth.viewer import curves
 from echotruth.viewer.clip import Clip
+from echotruth.viewer.paths import paths
 from echotruth.viewer.points import Points
 from echotruth.viewer.tint import COLOURS, components, indices, nice, tint
 
@@ -113,23 +114,11 @@ def test_scales_end_at_round_numbers(value, above):
     assert nice(value) == pytest.approx(above)
 
 
-def test_paths_lead_from_where_points_were_to_where_they_are(points):
-    for found, moved in ((arrows.true_motion(points), SHIFT[:2]), (arrows.tracked_motion(points, "two"), 2e-4)):
-        steps = np.sum(found.end - found.start, axis=0)
-        np.testing.assert_allclose(steps, np.broadcast_to(1e3 * moved, steps.shape), atol=1e-3)
-        np.testing.assert_array_equal(found.start[1:], found.end[:-1])
-        assert {tuple(place) for place in (found.end[-1] - steps).round(4).tolist()} <= {
-            tuple(place) for place in (1e3 * points.position).astype(np.float32).round(4).tolist()
-        }
-
-
-def test_arrows_of_the_flow_say_how_long_they_are_drawn(clip):
-    found = arrows.flow(clip)
-    drawn = found.end[0] - found.start[0]
-    known = np.isfinite(drawn).all(-1)
-    expected = np.broadcast_to(1e3 * found.scale * MOTION[:2] / (FRAMES - 1), drawn[known].shape)
-    np.testing.assert_allclose(drawn[known], expected, rtol=0.01)
-    assert found.scale >= 1 and np.isnan(found.start[-1]).all()
+def test_paths_are_where_some_points_are(points):
+    for displacement in (points.true_displacement, points.tracked_displacement("two")):
+        known = {tuple(place) for place in (1e3 * (points.position + displacement[-1])).astype(np.float32).tolist()}
+        drawn = {tuple(place) for place in paths(points, displacement)[-1].tolist()}
+        assert drawn <= known and 20 < len(drawn) < len(known)
 
 
 def test_curves_are_those_of_the_evaluation(clip):

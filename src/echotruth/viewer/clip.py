@@ -119,10 +119,10 @@ class Clip:
         number = schema.LABELS["strain_component"].index(component)
         return self.read(f"truth/{self.size}/strain", ..., number)
 
-    def flow(self, step: int) -> Floats32:
-        """Displacement to the next frame at every so manieth pixel, (frame, axial, lateral, 2): lateral, axial, m.
+    def flow(self) -> Floats32:
+        """Displacement to the next frame at every pixel, (frame, axial, lateral, 2): lateral, axial, m.
 
         It is NaN in the last frame and outside the wall.
         """
-        every, following = slice(step // 2, None, step), schema.LABELS["to"].index("next")
-        return self.read(f"truth/{self.size}/flow", slice(None), following, every, every, slice(0, 2))
+        following = schema.LABELS["to"].index("next")
+        return self.read(f"truth/{self.size}/flow", slice(None), following, ..., slice(0, 2))

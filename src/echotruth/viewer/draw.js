@@ -1,17 +1,17 @@
-// Draws the frame that the slider says: the pictures with their colours, paths and arrows, and the lines in the curves.
+// Draws the frame that the slider says: the pictures with their colours and paths, and the lines in the curves.
 // Arguments: slider, opacity (sliders); clip {grey}, times {time, text}; and for each panel, in lists, colours {index},
-// palettes {red, green, blue}, pictures {image}, labels, figures; movements and arrows, in pairs; cursors; and side, mm.
+// palettes {red, green, blue}, pictures {image}, labels, figures; positions {x, y} and paths, in pairs; and cursors.
 const state = (window.echotruth ??= { drawn: 0, pending: false, tables: [] });
 if (!state.pending) {
   state.pending = true; // several changes within a frame of the screen are drawn once
   requestAnimationFrame(() => {
     state.pending = false;
     const frame = Math.min(slider.value, times.data.time.length - 1);
-    const kinds = movements.length / figures.length;
+    const kinds = positions.length / figures.length;
     figures.forEach((figure, panel) => {
       if (!figure.visible) return; // drawn while hidden, a figure is laid out anew every time
       draw_picture(pictures[panel], panel, frame);
-      for (let n = panel * kinds; n < (panel + 1) * kinds; n++) draw_motion(movements[n], arrows[n], frame);
+      for (let n = panel * kinds; n < (panel + 1) * kinds; n++) draw_path(positions[n], paths[n], frame);
     });
     cursors.forEach((cursor) => { set(cursor, { location: times.data.time[frame] }); });
     labels.forEach((label, panel) => { if (figures[panel].visible) set(label, { text: times.data.text[frame] }); });
@@ -63,20 +63,14 @@ function blended(panel) {
   return table;
 }
 
-// A path is all its steps up to the frame, with a dot where the point is; an arrow is that of the frame alone.
-function draw_motion(movement, shown, frame) {
-  const { x0, y0, x1, y1 } = movement.data;
-  if (x0.length === 0 && shown.data.x0.length === 0) return;
-  const is_path = movement.tags.includes("path");
-  const points = Math.round(x0.length / times.data.time.length);
-  const from = is_path ? 0 : frame * points, count = (frame + 1) * points - from;
-  const [start_x, start_y, end_x, end_y] = [x0, y0, x1, y1].map((all) => part(Float32Array, all, from, count));
-  const angle = new Float32Array(count), head_x = new Float32Array(count).fill(NaN);
-  for (let i = count - points; i < count; i++) {
-    const dx = end_x[i] - start_x[i], dy = end_y[i] - start_y[i];
-    angle[i] = Math.atan2(-dy, dx) - Math.PI / 2; // depth is downwards, and a triangle points up
-    if (is_path || Math.hypot(dx, dy) > 0.008 * side.value) head_x[i] = end_x[i];
-  }
-  Object.assign(shown.data, { x0: start_x, y0: start_y, x1: end_x, y1: end_y, head_x, angle });
-  shown.change.emit();
+// A path is all its steps up to the frame, with a dot where the point is.
+function draw_path(position, path, frame) {
+  const { x, y } = position.data;
+  if (x.length === 0 && path.data.x0.length === 0) return;
+  const points = Math.round(x.length / times.data.time.length), count = (frame + 1) * points;
+  const [x1, y1] = [x, y].map((all) => part(Float32Array, all, 0, count));
+  const [x0, y0] = [x1, y1].map((all) => all.map((_, i) => all[Math.max(i - points, i % points)]));
+  const head_x = x1.map((value, i) => (i < count - points ? NaN : value));
+  Object.assign(path.data, { x0, y0, x1, y1, head_x });
+  path.change.emit();
 }

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import lru_cache
 from html import escape
 from typing import Any
 
@@ -11,15 +11,17 @@ import numpy as np
 from bokeh.document import Document
 from bokeh.layouts import column, row
 from bokeh.models import CheckboxButtonGroup, ColumnDataSource, Div, Range1d, Select, Slider, Toggle
+from numpy.typing import NDArray
 
 from echotruth.report import style
 from echotruth.repository import estimates
 from echotruth.repository.reader import Repository
-from echotruth.viewer import arrows, curves, facts, script
+from echotruth.viewer import curves, facts, script
 from echotruth.viewer.choice import NOTHING, TRUTH, Choice, inputs
 from echotruth.viewer.clip import PARTS, Clip
 from echotruth.viewer.graph import Graph
-from echotruth.viewer.panel import ARROWS, PATHS, Panel
+from echotruth.viewer.panel import PATHS, Panel
+from echotruth.viewer.paths import paths
 from echotruth.viewer.points import Points
 from echotruth.viewer.tint import component_name, components, tint
 
@@ -75,9 +77,8 @@ class Page:
         for name, widget in self.inputs.items():
             widget.name = name
             widget.on_change("value", lambda _attribute, _old, value, name=name: self._choose(name, value))
-        labels = [f"{kind} paths" if kind in PATHS else kind for kind in ARROWS]
-        self.arrows = CheckboxButtonGroup(labels=labels, active=[0, 1], name="arrows")
-        self.arrows.on_change("active", lambda _attribute, _old, _active: self.show())
+        self.paths = CheckboxButtonGroup(labels=[f"{kind} paths" for kind in PATHS], active=[0, 1], name="paths")
+        self.paths.on_change("active", lambda _attribute, _old, _active: self.show())
         self.play = Toggle(label="▶ Play", width=90, name="play", button_type="primary")
         self.rate = Select(title="", value="20", options=[(rate, f"{rate} frames/s") for rate in RATES], width=125)
         self.message = Div(name="message", visible=False, styles={"color": "#a33", "font-weight": "bold"})
@@ -85,12 +86,11 @@ class Page:
 
     def _scripts(self) -> None:
         """What happens in the browser alone."""
-        movements = [panel.movements[kind] for panel in self.panels for kind in ARROWS]
+        positions = [panel.positions[kind] for panel in self.panels for kind in PATHS]
         draw = script.callback(
             "draw",
             slider=self.frame,
             opacity=self.opacity,
-            side=self.side,
             clip=self.clip,
             times=self.times,
             colours=[panel.colour for panel in self.panels],
@@ -98,13 +98,13 @@ class Page:
             pictures=[panel.picture for panel in self.panels],
             labels=[panel.label for panel in self.panels],
             figures=[panel.figure for panel in self.panels],
-            movements=movements,
-            arrows=[panel.arrows[kind] for panel in self.panels for kind in ARROWS],
+            positions=positions,
+            paths=[panel.paths[kind] for panel in self.panels for kind in PATHS],
             cursors=[graph.cursor for graph in self.graphs.values()],
         )
         for slider in (self.frame, self.opacity):
             slider.js_on_change("value", draw)
-        for source in (self.clip, self.times, *(panel.colour for panel in self.panels), *movements):
+        for source in (self.clip, self.times, *(panel.colour for panel in self.panels), *positions):
             source.js_on_change("data", draw)
         for panel in self.panels:
             panel.figure.js_on_change("visible", draw)
@@ -122,7 +122,7 @@ class Page:
     def _layout(self) -> Any:
         chosen = self.inputs
         apart = {"flex-wrap": "wrap", "gap": "4px"}
-        switches = column(Div(text="Motion", margin=(5, 5, 0, 5)), self.arrows)
+        switches = column(Div(text="Motion", margin=(5, 5, 0, 5)), self.paths)
         clip = row(*(chosen[name] for name in ("case", "view", "size", "tracker", "other")), styles=apart)
         for widget in clip.children:  # narrower where the window is
             widget.styles = {"flex": f"1 1 {0.7 * widget.width:.0f}px", "max-width": f"{widget.width}px"}
@@ -223,7 +223,7 @@ class Page:
         self.times.data = {"time": time, "text": [f"{value:.1f} ms" for value in time]}
 
     def _show_panel(self, number: int, points: Points, tracker: str) -> None:
-        """Colours and arrows of one picture."""
+        """Colours and paths of one picture."""
         choice, panel = self.choice, self.panels[number]
         panel.figure.visible = tracker != NOTHING or number == 0
         if not panel.figure.visible:
@@ -237,14 +237,12 @@ class Page:
             self._once(
                 f"colour {number}", (*place, *colour), lambda: panel.tint(tint(points.clip, points, *colour, followed))
             )
-            for index, kind in enumerate(ARROWS):
-                wanted = index in self.arrows.active
-                move = partial(_move, panel, kind, points, followed, wanted)
-                self._once(f"{kind} {number}", (*place, wanted), move)
+            wanted = [kind for index, kind in enumerate(PATHS) if index in self.paths.active]
+            self._once(f"paths {number}", (*place, *wanted), lambda: _draw_paths(panel, points, followed, wanted))
         except ValueError as error:  # a tracker from outside that was not evaluated on this clip
             self._problems[str(error)] = None
             panel.clear()
-            for part in ("colour", *ARROWS):
+            for part in ("colour", "paths"):
                 self._shown.pop(f"{part} {number}", None)
 
     def _curves(self, clip: Clip) -> dict[str, Any]:
@@ -292,13 +290,13 @@ class Page:
         self.message.visible = bool(text)
 
 
-def _move(panel: Panel, kind: str, points: Points, tracker: str | None, wanted: bool) -> None:
-    """Show arrows of a kind if they are wanted, and if what they are made of is written."""
-    clip, found = points.clip, None
-    if wanted and kind == "true" and "tracking" in clip.parts:
-        found = arrows.true_motion(points)
-    elif wanted and kind == "tracked" and tracker and "tracking" in clip.parts:
-        found = arrows.tracked_motion(points, tracker)
-    elif wanted and kind == "flow" and "truth" in clip.parts:
-        found = arrows.flow(clip)
-    panel.move(kind, found)
+def _draw_paths(panel: Panel, points: Points, tracker: str | None, wanted: list[str]) -> None:
+    """Draw the paths that are wanted, if what they are made of is written."""
+    drawn = dict[str, NDArray[np.float32]]()
+    if "tracking" in points.clip.parts:
+        if "true" in wanted:
+            drawn["true"] = paths(points, points.true_displacement)
+        if tracker and "tracked" in wanted:
+            drawn["tracked"] = paths(points, points.tracked_displacement(tracker))
+    for kind in PATHS:
+        panel.draw(kind, drawn.get(kind))

@@ -1,22 +1,20 @@
-"""A picture on the page: a frame of the clip with its colours and arrows, axes in mm, and the scale of its colour."""
+"""A picture on the page: a frame of the clip with its colours and paths, axes in mm, and the scale of its colour."""
 
 import numpy as np
 from bokeh import models
 from bokeh.events import MouseMove
 from bokeh.plotting import figure
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
 
 from echotruth.report import style
 from echotruth.viewer import script
-from echotruth.viewer.arrows import Arrows
 from echotruth.viewer.tint import Tint
 
 SIDE = 520
 """Of a picture on the screen until the window's width is known, px."""
-ARROWS = {"true": style.MOTION, "tracked": style.SERIES[0], "flow": style.FLOW}
-"""Kind of paths or arrows to their colour; tracked ones have that of their tracker."""
-PATHS = ("true", "tracked")
-"""Those of them that are paths."""
+PATHS = {"true": style.MOTION, "tracked": style.SERIES[0]}
+"""Kind of paths to their colour; tracked ones have that of their tracker."""
 EMPTY = np.zeros(0, np.float32)
 NO_COLOUR = np.zeros((0, 0, 0), np.uint8)
 
@@ -51,16 +49,9 @@ class Panel:
         self.colour = models.ColumnDataSource({"index": [NO_COLOUR]}, name=f"colour_{name}")
         self.palette = models.ColumnDataSource({"red": EMPTY, "green": EMPTY, "blue": EMPTY})
         self.names = models.ColumnDataSource({"name": [""]})
-        self.movements = {
-            kind: models.ColumnDataSource(
-                dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY), tags=["path"] if kind in PATHS else []
-            )
-            for kind in ARROWS
-        }
-        ends = ("x0", "y0", "x1", "y1", "head_x", "angle")
-        self.arrows = {
-            kind: models.ColumnDataSource(dict.fromkeys(ends, EMPTY), name=f"{kind}_{name}") for kind in ARROWS
-        }
+        self.positions = {kind: models.ColumnDataSource({"x": EMPTY, "y": EMPTY}) for kind in PATHS}
+        steps = dict.fromkeys(("x0", "y0", "x1", "y1", "head_x"), EMPTY)
+        self.paths = {kind: models.ColumnDataSource(dict(steps), name=f"{kind}_{name}") for kind in PATHS}
         self.label = models.Label(
             x=8, y=8, x_units="screen", y_units="screen", text_color="white", text_font_size="13px"
         )
@@ -76,21 +67,18 @@ class Panel:
         self.figure = _figure(ranges, name)
         # Rows run downwards as depth does: the first is at depth 0, where the axis begins.
         self._image = self.figure.image_rgba("image", x=-1, y=0, dw=2, dh=2, source=self.picture, origin="bottom_left")
-        self._renderers = {kind: self._draw(kind) for kind in ARROWS}
+        self._renderers = {kind: self._glyphs(kind) for kind in PATHS}
         self.figure.add_layout(self.label)
         self.figure.add_layout(self.bar, "right")
         parts = {"picture": self.picture, "colour": self.colour, "bar": self.bar, "names": self.names}
         pointer = script.callback("pointer", clip=clip, slider=frame, side=side, said=said, **parts)
         self.figure.js_on_event(MouseMove, pointer)
 
-    def _draw(self, kind: str) -> list[models.GlyphRenderer]:
-        source, colour = self.arrows[kind], ARROWS[kind]
-        marker, size = ("circle", 5) if kind in PATHS else ("triangle", 6)
+    def _glyphs(self, kind: str) -> list[models.GlyphRenderer]:
+        source, colour = self.paths[kind], PATHS[kind]
         width = 3 if kind == "true" else 1.5  # so that it is seen below what is drawn over it
         line = self.figure.segment("x0", "y0", "x1", "y1", source=source, line_color=colour, line_width=width)
-        head = self.figure.scatter(
-            "head_x", "y1", angle="angle", marker=marker, size=size, source=source, color=colour, line_color=None
-        )
+        head = self.figure.scatter("head_x", "y1", size=5, source=source, color=colour, line_color=None)
         for renderer in (line, head):
             renderer.visible = False
         return [line, head]
@@ -109,10 +97,10 @@ class Panel:
         self._image.glyph.update(x=-side / 2, y=0, dw=side, dh=side)
 
     def clear(self) -> None:
-        """Show neither colours nor arrows."""
+        """Show neither colours nor paths."""
         self.tint(None)
-        for kind in ARROWS:
-            self.move(kind, None)
+        for kind in PATHS:
+            self.draw(kind, None)
 
     def tint(self, tint: Tint | None) -> None:
         """Show other colours, or none."""
@@ -133,15 +121,12 @@ class Panel:
         line, head = self._renderers["tracked"]
         line.glyph.line_color = head.glyph.fill_color = colour
 
-    def move(self, kind: str, arrows: Arrows | None) -> None:
-        """Show other arrows of a kind, or none."""
-        columns = dict.fromkeys(("x0", "y0", "x1", "y1"), EMPTY)
-        if arrows is not None:
-            values = (arrows.start[..., 0], arrows.start[..., 1], arrows.end[..., 0], arrows.end[..., 1])
-            columns = {name: value.ravel() for name, value in zip(columns, values, strict=True)}
-        self.movements[kind].data = columns
+    def draw(self, kind: str, position: NDArray[np.float32] | None) -> None:
+        """Draw other paths of a kind, given the positions (frame, n, 2) of their points in mm, or none."""
+        x, y = (EMPTY, EMPTY) if position is None else (position[..., 0].ravel(), position[..., 1].ravel())
+        self.positions[kind].data = {"x": x, "y": y}
         for renderer in self._renderers[kind]:
-            renderer.visible = arrows is not None
+            renderer.visible = position is not None
 
 
 def _figure(ranges: tuple[models.Range1d, models.Range1d], name: str) -> figure:

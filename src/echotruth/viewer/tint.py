@@ -177,7 +177,7 @@ def _segments(label: NDArray[np.uint8]) -> Tint:
 
 def _speed(clip: Clip) -> Tint:
     """Colours of the speed in the plane, from each frame to the next."""
-    flow = clip.flow(1)
+    flow = clip.flow()
     frame_time = float(clip.time[1] - clip.time[0]) if clip.frames > 1 else 1.0
     speed = 1e3 * np.hypot(flow[..., 0], flow[..., 1]) / frame_time
     limit = nice(largest(speed[:, ::7, ::7]))
