@@ -11,8 +11,7 @@ rule report:
     output:
         report(expand(f"{OUT}/figures/{{name}}.png", name=FIGURES), category="figures"),
         expand(f"{OUT}/figures/{{name}}.svg", name=FIGURES),
-        report(f"{OUT}/figures/clip.gif", category="clip"),
-        f"{OUT}/figures/clip.mp4",
+        report(f"{OUT}/figures/clip.mp4", category="clip"),
         f"{OUT}/figures/leaderboard.csv",
         f"{OUT}/inference.csv" if PLAN.config.inference.tracker else [],
         f"{OUT}/report.html",

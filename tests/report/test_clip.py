@@ -58,9 +58,8 @@ def test_lost_points_do_not_stop_the_clip(made, strain):
 
 def test_animations_and_video(made, strain, tmp_path):
     frames = drawn(made, strain, 120)
-    picture = Image.open(clip.gif(tmp_path / "clip.gif", frames))
-    assert picture.n_frames == 4 and picture.size == (276, 120) and picture.info["duration"] == 50
-    assert Image.open(clip.webp(tmp_path / "clip.webp", frames)).n_frames == 4
+    picture = Image.open(clip.webp(tmp_path / "clip.webp", frames))
+    assert picture.n_frames == 4 and picture.size == (276, 120)
     video = clip.mp4(tmp_path / "clip.mp4", frames).read_bytes()
     assert video[4:8] == b"ftyp" and len(video) > 1000
 
@@ -73,18 +72,3 @@ def test_video_has_the_same_bytes_on_one_core(tmp_path):
         assert clip.mp4(tmp_path / "one.mp4", frames).read_bytes() == expected
     finally:
         os.sched_setaffinity(0, cores)
-
-
-def test_gif_shows_what_its_frames_show(made, strain, tmp_path):
-    frames = drawn(made, strain, 240)
-    picture = Image.open(clip.gif(tmp_path / "clip.gif", frames))
-    picture.seek(2)
-    shown, wanted = np.asarray(picture.convert("RGB")).astype(int), frames[2].astype(int)
-    assert np.abs(shown - wanted).mean() < 5
-    coloured = wanted[..., 0] - wanted[..., 2] > 60
-    assert np.abs(shown - wanted)[coloured].mean() < 12
-
-
-def test_gif_of_noise_stays_small(tmp_path):
-    frames = np.random.default_rng(0).integers(0, 256, (40, 400, 400, 1)).astype(np.uint8).repeat(3, -1)
-    assert clip.gif(tmp_path / "clip.gif", frames).stat().st_size < 1.3 * clip.MAX_GIF_BYTES

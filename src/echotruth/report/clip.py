@@ -15,9 +15,6 @@ from PIL import Image
 
 from echotruth.report import style
 
-MAX_GIF_BYTES = 3_000_000
-"""Size that a GIF should not exceed, bytes."""
-
 WIDTH = 2.3
 """Of the frames, over their height."""
 
@@ -213,48 +210,8 @@ def round_length(side: float) -> float:
     return float(max(step * power for step in (1, 2, 5) if step * power <= side / 5))
 
 
-def smaller(frames: np.ndarray, height: int) -> np.ndarray:
-    """Frames of a smaller height, px.
-
-    Parameters
-    ----------
-    frames : ndarray of shape (frame, height, width, 3), uint8
-        RGB.
-    height : int
-
-    Returns
-    -------
-    ndarray of shape (frame, height, width, 3), uint8
-    """
-    size = round(frames.shape[2] * height / frames.shape[1]), height
-    return np.stack([np.asarray(Image.fromarray(one).resize(size, Image.Resampling.LANCZOS)) for one in frames])
-
-
-def gif(path: Path, frames: np.ndarray) -> Path:
-    """Write a looping GIF with as many colours as its size allows.
-
-    Parameters
-    ----------
-    path : Path
-    frames : ndarray of shape (frame, height, width, 3), uint8
-        RGB.
-
-    Returns
-    -------
-    Path
-    """
-    sampled = Image.fromarray(frames[:: max(1, len(frames) // 8)].reshape(-1, *frames.shape[2:]))
-    for colours in (64, 32, 16, 8):
-        palette = sampled.quantize(colours, Image.Quantize.FASTOCTREE)
-        first, *others = (Image.fromarray(one).quantize(palette=palette, dither=Image.Dither.NONE) for one in frames)
-        first.save(path, save_all=True, append_images=others, duration=1000 // FRAME_RATE, loop=0, optimize=False)
-        if path.stat().st_size <= MAX_GIF_BYTES:
-            break
-    return path
-
-
 def webp(path: Path, frames: np.ndarray) -> Path:
-    """Write a looping WebP, which takes a fifth of the room of a GIF and has all colours.
+    """Write a looping WebP, which pages of the docs show as a picture.
 
     Parameters
     ----------

@@ -48,7 +48,7 @@ OF_HEARTS = ("clip", "loop", "strain", "physiology", "heart", "views")
 OF_TRACKERS = ("curves", "segments", "bullseye", "error", "leaderboard")
 """Figures of what trackers found."""
 
-GIF_HEIGHT, VIDEO_HEIGHT = 300, 720
+HEIGHT = 720
 """Of the clip, px."""
 
 NONE_INFERRED = "Nothing was inferred of any heart. The reasons are in the report."
@@ -105,11 +105,10 @@ class Figures:
                 style.save(figure, self.folder / name)
 
     def _without_hearts(self) -> None:
-        """What else is written, without a heart: an empty table, and clips of the sentence."""
+        """What else is written, without a heart: an empty table, and a clip of the sentence."""
         table = "size_px,view,tracker,hearts,failures,rank\n"
         (self.folder / "leaderboard.csv").write_text(table, encoding="utf-8")
         picture = np.asarray(Image.open(self.folder / "clip.png").convert("RGB").resize((720, 102)))
-        clip.gif(self.folder / "clip.gif", picture[None])
         clip.mp4(self.folder / "clip.mp4", picture[None])
 
     def group(self, path: str, view: str | None = None) -> dict[str, NDArray[Any]]:
@@ -161,10 +160,8 @@ class Figures:
         return population.draw(measures(self.repository, self.repository.shown), diagnoses)
 
     def clip(self) -> None:
-        """The clip beside its truth, as a GIF and as a video."""
-        frames = self.frames(VIDEO_HEIGHT)
-        clip.gif(self.folder / "clip.gif", clip.smaller(frames, GIF_HEIGHT))
-        clip.mp4(self.folder / "clip.mp4", frames)
+        """The clip beside its truth, as a video."""
+        clip.mp4(self.folder / "clip.mp4", self.frames(HEIGHT))
 
     def frames(self, height: int) -> NDArray[np.uint8]:
         """Frames of the clip beside its truth, of a height, px."""
