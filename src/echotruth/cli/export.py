@@ -20,11 +20,7 @@ def add(parser: argparse.ArgumentParser) -> None:
         ("view", str, "name of the view; can be repeated (default: all)"),
         ("size", int, "image size, px; can be repeated (default: the largest)"),
         ("tracker", str, "tracker for csv; can be repeated (default: all)"),
-        (
-            "overlay",
-            str,
-            "wall, segments, tissue, displacement or scale over mp4, gif and png; can be repeated (default: none)",
-        ),
+        ("overlay", str, "wall, segments, tissue or displacement over mp4, gif and png; can be repeated"),
     )
     parser.add_argument("--rate", type=float, help="frames per second of mp4 and gif (default: 20)")
     parser.add_argument(

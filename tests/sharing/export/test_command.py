@@ -53,7 +53,7 @@ REFUSED = {
     "case": (["--case", "hart"], "case = 'hart': use one of heart"),
     "tracker": (["--format", "csv", "--tracker", "three"], "tracker = 'three': use one of one, two"),
     "tracker of a video": (["--tracker", "one"], "--tracker does nothing for mp4: it is for csv"),
-    "overlay": (["--overlay", "strain"], "--overlay strain: use wall, segments, tissue, displacement, scale"),
+    "overlay": (["--overlay", "strain"], "--overlay strain: use wall, segments, tissue, displacement"),
     "rate": (["--rate", "0"], "--rate 0: give 0.1 to 1000 frames per second"),
 }
 

@@ -143,21 +143,6 @@ def test_arrows_are_as_long_as_the_displacement(exported, known):
     assert opposite[tuple(start.T)].mean() > 0.5
 
 
-def test_depth_scale_has_its_marks_where_the_depth_is_and_the_dot_runs_with_time(exported, known):
-    """12 mm or what the field of view is, marked at every multiple of a round step; the dot moves evenly."""
-    found = overlaid(exported, "scale")
-    size = SIZES[0]
-    margin = round(0.03 * size)
-    white = found.min(axis=-1)[0, :, size - 1 - margin] > 200
-    rows = np.flatnonzero(white)
-    step = 1e-3 if size * known.spacing <= 8.1e-3 else 2e-3
-    expected = np.arange(step, size * known.spacing, step) / known.spacing - 0.5
-    assert all(np.abs(rows - level).min() <= 0.5 + 1e-9 for level in expected)
-    orange = (found[..., 0] - found[..., 2] > 100) & (np.arange(size)[:, None] > size - 3 * margin)
-    columns = np.array([np.argwhere(frame)[:, 1].mean() for frame in orange])
-    assert np.all(np.diff(columns) > 0) and np.ptp(np.diff(columns)) < 2
-
-
 def test_video_of_an_odd_number_of_pixels_keeps_its_scale(known, tmp_path):
     clip = ExportedClip(Repository(known.folder), known.case, "mid", 127)
     clip.__dict__["image"] = known.images(SIZES[0])[:, :127, :127]

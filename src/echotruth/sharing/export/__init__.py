@@ -79,7 +79,7 @@ FORMATS = {
 }
 """What can be written, by the name of the format."""
 
-OVERLAYS = ("wall", "segments", "tissue", "displacement", "scale")
+OVERLAYS = ("wall", "segments", "tissue", "displacement")
 """What can be drawn over the images."""
 
 
@@ -96,7 +96,7 @@ class Export:
         Their names; all if empty.
     sizes : sequence of int
         Pixels along a side; the largest if empty.
-    overlay : sequence of {"wall", "segments", "tissue", "displacement", "scale"}
+    overlay : sequence of {"wall", "segments", "tissue", "displacement"}
         What to draw over the images of mp4, gif and png.
     rate : float
         Frames per second of mp4 and gif.

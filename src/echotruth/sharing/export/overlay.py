@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageColor, ImageDraw, ImageFont
+from PIL import Image, ImageColor, ImageDraw
 
 from echotruth.arrays import Floats
 from echotruth.report.palette import BORDER, MOTION, SEGMENTS, TISSUES
@@ -17,12 +17,6 @@ OPACITY = 0.35
 
 ARROWS_ALONG_SIDE = 28
 """Arrows along the side of an image that is all wall."""
-
-SCALE = "#f2f2f2"
-"""Colour of the depth scale, the time and the line of the beat."""
-
-DEPTHS = 8
-"""Marks of the depth scale, at most."""
 
 _DETAIL = 4
 """Pixels, along each axis, of which a drawing has one, so that its edges are smooth."""
@@ -36,10 +30,9 @@ def pictures(clip: ExportedClip, overlay: Sequence[str]) -> Pictures:
     Parameters
     ----------
     clip : ExportedClip
-    overlay : sequence of {"wall", "segments", "tissue", "displacement", "scale"}
+    overlay : sequence of {"wall", "segments", "tissue", "displacement"}
         The border of the wall; the AHA segments in colour; all tissues in colour; arrows from where points of the
-        tissue were at end-diastole to where they are; a depth scale, the time since end-diastole, and a line of the
-        beat, with a spike at end-diastole, a mark at end-systole and a dot that runs along it.
+        tissue were at end-diastole to where they are.
 
     Returns
     -------
@@ -87,56 +80,11 @@ def _displacement(clip: ExportedClip, frames: Pictures) -> None:
                 draw.ellipse(_fine(np.stack([end - radius, end + radius])), 255)
 
 
-def _scale(clip: ExportedClip, frames: Pictures) -> None:
-    """Draw the depth scale at the right, and the time and the line of the beat at the bottom."""
-    size, margin, thickness = clip.size, round(0.03 * clip.size), _thickness(clip)
-    step = _round_step(size * clip.spacing / DEPTHS)
-    depths = np.arange(step, size * clip.spacing, step)
-    period, es = clip.time[-1] + clip.frame_time, clip.time[clip.heart.es]
-    left, right, row = margin, size - 1 - margin, size - 1 - margin
-    for frame, time in zip(frames, clip.time, strict=True):
-        for number, depth in enumerate(depths, start=1):
-            start, at = clip.axial[0] - clip.spacing / 2, right - margin * (2 if number % 5 == 0 else 1)
-            level = round((depth - start) / clip.spacing - 0.5)
-            _bar(frame, (level, level), (at, right), thickness)
-        _bar(frame, (row, row), (left, size // 2), thickness)
-        spikes = ((clip.time[start], 3 * margin) for start in clip.case.config.loop.beat_starts[:-1])
-        for moment, height in (*spikes, (es, margin)):
-            column = round(left + moment / period * (size // 2 - left))
-            _bar(frame, (row - height, row), (column, column), thickness)
-        column = round(left + time / period * (size // 2 - left))
-        with _drawing(frame, MOTION) as draw:
-            dot = np.array([column, row])
-            draw.ellipse(_fine(np.stack([dot - 2 * thickness, dot + 2 * thickness])), 255)
-        _write(frame, f"{1e3 * time:.0f} ms", (left + margin, row - 2 * margin))
-        _write(frame, f"{1e3 * step:g} mm", (0, 2 * margin), right)
-
-
-def _round_step(least: float) -> float:
-    """The smallest of 1, 2 and 5 times a power of ten that is not below a length, m."""
-    power = 10.0 ** np.floor(np.log10(least))
-    return float(next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9)))
-
-
-def _bar(frame: Pictures, rows: tuple[int, int], columns: tuple[int, int], thickness: int) -> None:
-    """Fill the pixels from the first to the last row and column with the colour of the scale."""
-    first, last = np.array([rows, columns]).T
-    first, last = np.maximum(first - (thickness - 1) // 2, 0), last + thickness // 2 + 1
-    frame[first[0] : last[0], first[1] : last[1]] = ImageColor.getrgb(SCALE)
-
-
-def _write(frame: Pictures, text: str, corner: tuple[int, int], right: int | None = None) -> None:
-    """Write a text with its lower left corner at (column, row), or its right end at a column."""
-    anchor, column = ("ls", corner[0]) if right is None else ("rs", right)
-    font = ImageFont.load_default(_DETAIL * max(9, 0.025 * len(frame)))
-    with _drawing(frame, SCALE) as draw:
-        draw.text(_fine(np.array([[column, corner[1]]]))[0], text, 255, font, anchor)
-
-
 DRAWINGS: dict[str, Callable[[ExportedClip, Pictures], None]] = {
     "segments": partial(_tint, name="segment", palette=SEGMENTS),  # those of AHA next to each other differ
     "tissue": partial(_tint, name="tissue", palette=TISSUES),
-    **{"wall": _wall, "displacement": _displacement, "scale": _scale},
+    "wall": _wall,
+    "displacement": _displacement,
 }
 """Name of an overlay to the function that draws it, those below first."""
 
