@@ -1,31 +1,27 @@
 """Fetching a release: its parts from a folder, a web server or an archive with a DOI, unpacked to a repository.
 
 Parts are downloaded by pooch, which compares each with its checksum in the registry. A part that is unpacked leaves a
-note of it and is deleted, so that what broke off goes on with the part that was under way. Nothing is written but below
-the folder of the repository, and over no file but those of which a note says that this release wrote them.
+note of it and is deleted, so that what broke off goes on with the part that was under way. Nothing is written but into
+the folder of the repository, which must not be there before the first part.
 """
 
 import csv
 import re
 import shutil
-from errno import EEXIST
 from hashlib import sha256
 from io import StringIO
 from pathlib import Path
 from typing import Any
-from zipfile import ZipFile
+from zipfile import ZIP_STORED, BadZipFile, ZipFile
 
 from echotruth.files import user_cache
 from echotruth.repository.choice import Names, chosen
 from echotruth.repository.reader import Repository
-from echotruth.sharing.extraction import in_the_way, members
 
 REGISTRY, PARTS = "registry.txt", "parts.csv"
 """Names of the files of a release that say what the others are."""
 STRUCTURE, HEARTS = "structure", "hearts"
 """What the parts hold that make up the repository."""
-UNPACKED = ".unpacked"
-"""Suffix of the note of a part: a line for each file that is unpacked of it, and one of its checksum once all are."""
 CHECKSUM = re.compile("sha256:[0-9a-f]{64}")
 """What a registry has of each file."""
 REMEDY = "give the folder or address of a release"
@@ -144,21 +140,20 @@ class _Release:
         return self.folder / name
 
     def unpack(self, part: str, name: str) -> None:
-        """Fetch a part and unpack it below the folder of the repository, unless that is done."""
-        note, checksum = self.parts_folder / f"{part}{UNPACKED}", self.pooch.registry.get(part)
-        if checksum and note.is_file() and _lines(note)[-1] == checksum:
+        """Fetch a part and unpack it into the folder of the repository, unless a note has its checksum."""
+        note, checksum = self.parts_folder / f".{part}.unpacked", str(self.pooch.registry.get(part))
+        if note.is_file() and note.read_text(encoding="utf-8") == checksum:
             return
         path = self._file(part)
+        home, begun = self.folder / name, self.parts_folder / f".begun-{name}"
+        if not begun.is_file() and (home.exists() or home.is_symlink()):
+            remedy = "remove it, or give another folder"
+            raise FetchError(f"{home}: is there, and this release did not write it: {remedy}")
         try:
             with ZipFile(path) as archive:
-                files = members(archive, name)
-                if there := in_the_way(files, self.folder, self._written()):
-                    raise FileExistsError(EEXIST, "it is there", there)
-                _add(note, files)  # first, so that what breaks off is not taken for a file of someone else
-                archive.extractall(self.folder, files)
-        except FileExistsError as error:
-            remedy = "remove it, or give another folder"
-            raise FetchError(f"{error.filename}: is there, and this release did not write it: {remedy}") from None
+                _check_members(archive, name)
+                begun.touch()
+                archive.extractall(self.folder)
         except OSError as error:
             remedy = "it must be a folder that you may write to, with space; the same call goes on"
             raise FetchError(
@@ -167,18 +162,13 @@ class _Release:
         except Exception as error:  # ZipFile has no common type for what is wrong with an archive
             problem = _line(error) or "it is cut off"
             raise FetchError(f"{self.source}/{part}: is not a part of a release ({problem}): {REMEDY}") from None
-        _add(note, [str(checksum)])
+        note.write_text(checksum, encoding="utf-8")
         path.unlink()
-
-    def _written(self) -> set[str]:
-        """Files that were unpacked of this release, as its notes name them."""
-        return {line for note in self.parts_folder.glob(f"*{UNPACKED}") for line in _lines(note)}
 
     def _file(self, name: str) -> Path:
         """A file of the release, fetched and compared with its checksum unless that is done."""
         address = f"{self.source}/{name}"
-        # A file that passes for a note would say of any other that this release wrote it.
-        is_strange = Path(name).name != name or name.startswith(".") or name.endswith(UNPACKED)
+        is_strange = Path(name).name != name or name.startswith(".")  # with a dot, it could pass for a note
         if is_strange or name not in self.pooch.registry:
             raise FetchError(f"{self.source}/{REGISTRY}: has no file {name!r}: the release is not whole")
         try:
@@ -198,13 +188,16 @@ class _Release:
             raise FetchError(f"{address}: cannot be had ({said}): {remedy}") from None
 
 
-def _lines(note: Path) -> list[str]:
-    return note.read_text(encoding="utf-8").split("\n")
+def _check_members(archive: ZipFile, name: str) -> None:
+    """Refuse an archive of which a file is not below a folder, or is larger than it is in the archive.
 
-
-def _add(note: Path, lines: list[str]) -> None:
-    with note.open("a", encoding="utf-8") as file:
-        file.write("".join(f"\n{line}" for line in lines))
+    Links are no danger, as :meth:`ZipFile.extractall` writes them as files, and leaves out `..` in names.
+    """
+    for entry in archive.infolist():
+        if entry.compress_type != ZIP_STORED:
+            raise BadZipFile("its files are compressed")
+        if not entry.filename.startswith(f"{name}/"):
+            raise BadZipFile(f"{entry.filename[:80]!r} is no file below {name[:80]}")
 
 
 def _line(error: Exception) -> str:
