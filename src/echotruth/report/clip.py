@@ -21,14 +21,8 @@ WIDTH = 2.3
 WALL_GREY = 105
 """Grey level, of 255, to which a darker wall is brightened."""
 
-FRAME_RATE = 20
-"""Frames per second of the animation, which is in slow motion."""
-
 SLOW_RATE = 12
 """Frames per second of the first picture of the docs, slow enough to follow a point."""
-
-BEATS = 3
-"""Repetitions of the clip in its video."""
 
 
 @dataclass(frozen=True)
@@ -225,37 +219,4 @@ def webp(path: Path, frames: np.ndarray) -> Path:
     """
     first, *others = map(Image.fromarray, frames)
     first.save(path, save_all=True, append_images=others, duration=1000 // SLOW_RATE, loop=0, quality=80, method=6)
-    return path
-
-
-def mp4(path: Path, frames: np.ndarray) -> Path:
-    """Write an H.264 video that browsers play, of `BEATS` repetitions of the clip.
-
-    Parameters
-    ----------
-    path : Path
-    frames : ndarray of shape (frame, height, width, 3), uint8
-        RGB, height and width even.
-
-    Returns
-    -------
-    Path
-    """
-    import imageio_ffmpeg
-
-    size = frames.shape[2], frames.shape[1]
-    video = imageio_ffmpeg.write_frames(
-        str(path),
-        size,
-        fps=FRAME_RATE,
-        codec="libx264",
-        quality=6,
-        macro_block_size=2,
-        # Half the time of the default for 2 % more bytes; one thread, as the bytes depend on their number.
-        output_params=["-preset", "veryfast", "-threads", "1"],
-    )
-    video.send(None)
-    for frame in np.concatenate([frames] * BEATS):
-        video.send(np.ascontiguousarray(frame))
-    video.close()
     return path

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
+from echotruth import video
 from echotruth.cases.labels import heart_of
 from echotruth.evaluation.leaderboard import best, standings
 from echotruth.heart import Heart
@@ -48,8 +49,8 @@ OF_HEARTS = ("clip", "loop", "strain", "physiology", "heart", "views")
 OF_TRACKERS = ("curves", "segments", "bullseye", "error", "leaderboard")
 """Figures of what trackers found."""
 
-HEIGHT = 720
-"""Of the clip, px."""
+HEIGHT, FRAME_RATE, BEATS = 720, 20, 3
+"""Of the clip: its height, px, frames per second, which is slow motion, and repetitions."""
 
 NONE_INFERRED = "Nothing was inferred of any heart. The reasons are in the report."
 """In place of the figure of what was inferred."""
@@ -109,7 +110,7 @@ class Figures:
         table = "size_px,view,tracker,hearts,failures,rank\n"
         (self.folder / "leaderboard.csv").write_text(table, encoding="utf-8")
         picture = np.asarray(Image.open(self.folder / "clip.png").convert("RGB").resize((720, 102)))
-        clip.mp4(self.folder / "clip.mp4", picture[None])
+        self._film(picture[None])
 
     def group(self, path: str, view: str | None = None) -> dict[str, NDArray[Any]]:
         """Arrays of a group for the heart that is shown."""
@@ -161,7 +162,10 @@ class Figures:
 
     def clip(self) -> None:
         """The clip beside its truth, as a video."""
-        clip.mp4(self.folder / "clip.mp4", self.frames(HEIGHT))
+        self._film(self.frames(HEIGHT))
+
+    def _film(self, frames: NDArray[np.uint8]) -> None:
+        video.write(self.folder / "clip.mp4", np.concatenate([frames] * BEATS), FRAME_RATE, quality=20)
 
     def frames(self, height: int) -> NDArray[np.uint8]:
         """Frames of the clip beside its truth, of a height, px."""
