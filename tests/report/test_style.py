@@ -50,7 +50,7 @@ def test_shortening_is_blue_and_zero_is_white():
 
 
 def test_no_other_module_of_the_package_names_a_colour_of_a_quantity():
-    """Not as a number, so that it cannot differ; style sheets of dark paper have shades of their own."""
+    """Not as a number, so that it cannot differ."""
     named = {quantity.colour for quantity in style.QUANTITIES.values()} - {style.INK}
     named |= {style.MOTION, style.FLOW, style.BORDER, *style.SERIES}
     named |= {to_hex(colour) for colour in style.layer_colours(3)}

@@ -1,5 +1,6 @@
 """Page of a repository: one file with figures, playing clips, tables and provenance, which needs no network."""
 
+from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from echotruth import files
 from echotruth.cases import diagnosis
 from echotruth.config import shipped
 from echotruth.evaluation.leaderboard import best
-from echotruth.report import account, board, style, vector
+from echotruth.report import account, board, style
 from echotruth.report.clips import clips
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import MEASURES, subjects
@@ -64,7 +65,7 @@ def _context(repository: Repository) -> dict[str, Any]:
         "packages": repository.attributes("").get("packages", {}),
         "css": Markup(_colours(number) + (HERE / "page.css").read_text(encoding="utf-8")),
         "script": Markup((HERE / "player.js").read_text(encoding="utf-8")),
-        "figure": lambda name, title: Markup(vector.inline(folder / f"figures/{name}.svg", title)),
+        "figure": lambda name: _address(folder / f"figures/{name}.svg"),
         "title": style.title,
         "diagnosis": diagnosis(config),
         "imaged": account.imaged(repository),
@@ -90,11 +91,13 @@ def _context(repository: Repository) -> dict[str, Any]:
     }
 
 
-def _colours(tracker: int) -> str:
-    """The colours of figures, and of the tracker with a number in the clips, as variables of a style sheet.
+def _address(drawing: Path) -> str:
+    """An SVG as an address that holds its data."""
+    return "data:image/svg+xml;base64," + b64encode(drawing.read_bytes()).decode()
 
-    It replaces those of the figures where the paper is dark.
-    """
-    named = {name: colour for colour, name in vector.VARIABLES.items()}
-    named |= {"motion": style.MOTION, "tracked": f"var(--{vector.VARIABLES[style.series_colour(tracker)]})"}
+
+def _colours(tracker: int) -> str:
+    """Colours of figures, and of the tracker with a number in the clips, as variables of a style sheet."""
+    named = {"paper": style.PAPER, "ink": style.INK, "muted": style.MUTED, "grid": style.GRID, "failed": style.RADIAL}
+    named |= {"motion": style.MOTION, "tracked": style.series_colour(tracker)}
     return ":root { " + " ".join(f"--{name}: {colour};" for name, colour in named.items()) + " }\n"

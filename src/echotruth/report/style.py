@@ -27,7 +27,7 @@ INK, MUTED, GRID, SHADE, PAPER = "#1b2026", "#5b646e", "#e3e6e9", "#f2efe8", "#f
 """Colours of text and axes, of remarks, of grid lines, of shaded spans, and of the paper."""
 
 ON_IMAGE = "#fefefe"
-"""Colour of what stands on dark images and segments, on white and on dark paper."""
+"""Colour of what stands on dark images and segments."""
 
 TARGET, SOLVED = "#9a9fa5", INK
 """Colours of prescribed and of solved values."""
@@ -161,7 +161,7 @@ def save(figure: Figure, path: str | Path, dpi: int = 160) -> Path:
     figure : Figure
     path : str or Path
         The suffix determines the format. Without one, the figure is written as PNG on white paper, and as SVG without
-        paper, which the page of the report shows in its own colours.
+        paper.
     dpi : int
         Of the PNG, and of pictures within an SVG.
 
