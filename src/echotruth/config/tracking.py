@@ -72,7 +72,7 @@ class WindowDeformation(Section):
 
 
 class BsplineDic(Section):
-    """Digital image correlation of the whole wall at once; the motion is a cubic B-spline."""
+    """Digital image correlation of the whole wall at once; the motion is a cubic B-spline, of volumes trilinear."""
 
     method: Literal["bspline_dic"] = "bspline_dic"
     """Name of the method."""
@@ -95,7 +95,8 @@ class BsplineDic(Section):
     `bmode.field_of_view_mm`."""
     smoothness: Positive | None = None
     """Weight of the bending energy of a step, times the power of the noise over that of the speckle and the speckle
-    length over the distance between knots. Default: the weight for which the images of the step give most evidence."""
+    length over the distance between knots. Default: the weight for which the images of the step give most evidence, and
+    2000 in volumes."""
     transmural_scale: Annotated[FiniteFloat, Field(gt=0, le=1)] = 0.2
     """Scale of lengths through the wall in the bending energy; lengths along the wall have the scale 1."""
     tolerance: Positive = 4.0
@@ -134,6 +135,18 @@ class Dis(Section):
     preset: Literal["ultrafast", "fast", "medium", "fine"] = "medium"
     """Preset of OpenCV; `fine` is `medium` down to the full size of the images, with larger patches: more accurate, and
     several times as slow."""
+    reference: Reference = "bidirectional"
+
+
+class OpticalFlowIlk(Section):
+    """Iterative Lucas-Kanade flow of scikit-image, unmodified; of volumes alone."""
+
+    method: Literal["optical_flow_ilk"] = "optical_flow_ilk"
+    """Name of the method."""
+    radius: Annotated[int, Field(ge=1, le=50)] = 6
+    """Half the side of the window that moves as one, voxels."""
+    warps: Annotated[int, Field(ge=1, le=50)] = 4
+    """Number of times that the volume is warped."""
     reference: Reference = "bidirectional"
 
 
@@ -270,9 +283,13 @@ METHODS: tuple[type[Section], ...] = (
     BsplineDic,
     BsplineCnn,
     Dis,
+    OpticalFlowIlk,
     *OUTSIDE,
 )
 """Sections of all methods of tracking."""
+
+VOLUMETRIC: tuple[type[Section], ...] = (BsplineDic, OpticalFlowIlk)
+"""Sections of methods that track volumes."""
 
 BUILTIN = tuple(method.model_fields["method"].default for method in METHODS if method not in OUTSIDE)
 """Names of the methods of echotruth."""

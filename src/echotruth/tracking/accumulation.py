@@ -121,7 +121,7 @@ def follow(tracker: PairTracker, frames: np.ndarray, points: np.ndarray, referen
         weighted_mean(weight[..., None], *displacements),
         weighted_mean(weight, *qualities),
         combined_variance(*variances),
-        np.hypot(*np.moveaxis(displacements[0] - displacements[1], -1, 0)),
+        length(displacements[0] - displacements[1]),
     )
 
 
@@ -148,6 +148,13 @@ def step_variance(quality: np.ndarray) -> np.ndarray:
     """Variance 1 / rho^2 - 1 of single steps with correlations rho, up to a constant factor; infinite without one."""
     rho = np.where(quality > 0, np.minimum(quality, 1), np.nan)
     return np.nan_to_num(1 / rho**2 - 1, nan=np.inf)
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Length of vectors along the last axis, in the plane or in space."""
+    first, second, *third = np.moveaxis(vectors, -1, 0)
+    plane = np.hypot(first, second)
+    return np.hypot(plane, *third) if third else plane
 
 
 def _accumulate(tracker: PairTracker, images: Iterator[Any], points: np.ndarray, stepwise: bool):

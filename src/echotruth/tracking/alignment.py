@@ -133,11 +133,12 @@ def robust_match(warped, template, tolerance, seen):
     force
         w r g, shape (pixel, 2).
     """
-    residual, force = warped[:, 0] - template, np.empty((len(template), 2))
+    residual, force = warped[:, 0] - template, np.empty((len(template), warped.shape[1] - 1))
     weight = geman_mcclure(residual, tolerance, seen)
     for pixel in range(len(template)):
         product = weight[pixel] * residual[pixel]
-        force[pixel, 0], force[pixel, 1] = product * warped[pixel, 1], product * warped[pixel, 2]
+        for axis in range(force.shape[1]):
+            force[pixel, axis] = product * warped[pixel, axis + 1]
     return residual, weight, force
 
 

@@ -77,8 +77,8 @@ class BendingEnergy:
 
 
 def _product(band: np.ndarray, field: np.ndarray) -> np.ndarray:
-    """Product of a symmetric banded matrix (unknowns, width) and a field (unknowns,)."""
-    return blas.dsbmv(band.shape[1] - 1, 1.0, band.T, field)
+    """Product of a symmetric matrix, banded (unknowns, width) or sparse, and a field (unknowns,)."""
+    return blas.dsbmv(band.shape[1] - 1, 1.0, band.T, field) if isinstance(band, np.ndarray) else band @ field
 
 
 def bending_matrix(cells: Cells, metrics: np.ndarray, angle_derivatives: np.ndarray, size: int) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Grey values of clips: normalisation, inversion of the log compression, gain, and local correlation of two images."""
 
 from math import log
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ def rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(values, dtype=float)))) if values.size else 0.0
 
 
-def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.ndarray:
+def even_gain(amplitude: np.ndarray, deviation: Any, typical: float) -> np.ndarray:
     """Amplitudes of the same brightness everywhere: over their local RMS, times a typical one.
 
     Shadow, depth and obliquity of the wall change the gain slowly from place to place. Where it is low, speckle is as
@@ -76,9 +77,9 @@ def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.nda
 
     Parameters
     ----------
-    amplitude : ndarray of shape (axial, lateral), float32
-    deviation : float
-        Standard deviation of the Gaussian weights of the local RMS, px.
+    amplitude : ndarray of shape (axial, lateral) or (depth, elevation, lateral), float32
+    deviation : float or ndarray of shape (3,)
+        Standard deviation of the Gaussian weights of the local RMS, px; of a volume along each axis.
     typical : float
         Typical RMS of the amplitude in the wall.
 
@@ -87,10 +88,15 @@ def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.nda
     ndarray of the same shape and type
         The amplitudes as they are if `typical` is 0.
     """
-    import cv2  # whoever brings a tracker needs none
-
     if not typical > 0:
         return amplitude
+    power = _local_power(amplitude, deviation) if amplitude.ndim == 2 else _volume_power(amplitude, deviation)
+    return amplitude / np.sqrt(power / np.float32(typical**2) + np.float32(10 ** (MIN_GAIN_DB / 10)))
+
+
+def _local_power(amplitude: np.ndarray, deviation: float) -> np.ndarray:
+    import cv2  # whoever brings a tracker needs none
+
     size = amplitude.shape[::-1]
     # The mean is so smooth that a few pixels per standard deviation give it.
     side = max(1, int(deviation / PIXELS_PER_DEVIATION))
@@ -99,8 +105,23 @@ def even_gain(amplitude: np.ndarray, deviation: float, typical: float) -> np.nda
     total = cv2.resize(total, reduced, interpolation=cv2.INTER_AREA)
     total = cv2.GaussianBlur(total, (0, 0), deviation / side, borderType=cv2.BORDER_REFLECT)
     mean = total[..., 0] / np.maximum(total[..., 1], np.float32(1e-6))
-    power = cv2.resize(mean, size, interpolation=cv2.INTER_LINEAR)
-    return amplitude / np.sqrt(power / np.float32(typical**2) + np.float32(10 ** (MIN_GAIN_DB / 10)))
+    return cv2.resize(mean, size, interpolation=cv2.INTER_LINEAR)
+
+
+def _volume_power(amplitude: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    from scipy import ndimage  # whoever brings a tracker needs none
+
+    side = np.maximum(1, (deviation / PIXELS_PER_DEVIATION).astype(int))
+    reduced = np.maximum(1, amplitude.shape // side)
+    kept = amplitude[tuple(map(slice, np.minimum(reduced * side, amplitude.shape)))]
+    blocks = np.stack([kept.shape // reduced, reduced])[::-1].T.ravel()
+    total = [
+        ndimage.gaussian_filter(values.reshape(blocks).mean((1, 3, 5)), deviation / side)
+        for values in (kept * kept, (kept > 0).astype(kept.dtype))
+    ]
+    mean = total[0] / np.maximum(total[1], np.float32(1e-6))
+    zoom = np.array(amplitude.shape) / reduced
+    return ndimage.zoom(mean, zoom, order=1, mode="nearest", grid_mode=True)
 
 
 def decompression_slope(amplitude: np.ndarray, decibels: float) -> np.ndarray:
@@ -112,30 +133,38 @@ def _nepers(decibels: float) -> float:
     return decibels * log(10) / 20
 
 
-def local_ncc(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
-    """Zero-normalised cross-correlation of two images in a square around every pixel.
+def local_ncc(first: np.ndarray, second: np.ndarray, side: Any) -> np.ndarray:
+    """Zero-normalised cross-correlation of two images in a square, or a block of a volume, around every pixel.
 
     Parameters
     ----------
-    first, second : ndarray of shape (axial, lateral)
+    first, second : ndarray of shape (axial, lateral) or (depth, elevation, lateral)
         Grey values from 0 to 1.
-    side : int
-        Side of the square, px, odd; images are mirrored at their borders.
+    side : int or tuple of int
+        Side of the square, px, odd, or those of the block; images are mirrored at their borders.
 
     Returns
     -------
-    ndarray of shape (axial, lateral)
+    ndarray of the same shape
         From -1 to 1; NaN where the square has no texture in either image, or contains a pixel without a value.
     """
-    import cv2
-
     known = np.isfinite(first) & np.isfinite(second)
     a, b = (np.where(known, image, 0).astype(float) for image in (first, second))
-    # OpenCV takes running sums, whose rounding depends on where a thread begins.
-    cv2.setNumThreads(1)
     images = (a, b, a * a, b * b, a * b, 1.0 - known)
-    a, b, aa, bb, ab, unknown = (cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT) for image in images)
+    a, b, aa, bb, ab, unknown = (_box_mean(image, side) for image in images)
     variances = aa - a**2, bb - b**2
-    valid = (np.minimum(*variances) > MIN_STD**2) & (unknown < 0.5 / side**2)
+    valid = (np.minimum(*variances) > MIN_STD**2) & (unknown < 0.5 / np.prod(np.broadcast_to(side, first.ndim)))
     product = np.where(valid, variances[0] * variances[1], np.nan)
     return np.clip((ab - a * b) / np.sqrt(product), -1, 1)
+
+
+def _box_mean(image: np.ndarray, side: Any) -> np.ndarray:
+    if image.ndim == 3:
+        from scipy import ndimage
+
+        return ndimage.uniform_filter(image, side, mode="reflect")
+    import cv2
+
+    # OpenCV takes running sums, whose rounding depends on where a thread begins.
+    cv2.setNumThreads(1)
+    return cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT)

@@ -1,9 +1,12 @@
 """Normalised cross-correlation of two images of the same wall pixels, around single points and over the whole wall."""
 
+from typing import Any
+
 import numpy as np
 
 from echotruth.tracking.bspline import lattice_around
 from echotruth.tracking.grey import MIN_STD, decompression_slope
+from echotruth.tracking.trilinear import trilinear_lattice
 
 
 class NormalizedCrossCorrelation:
@@ -11,21 +14,26 @@ class NormalizedCrossCorrelation:
 
     Parameters
     ----------
-    positions : ndarray of shape (pixel, 2)
-        Lateral, axial, px.
+    positions : ndarray of shape (pixel, 2) or (pixel, 3)
+        Lateral, axial, px; of volumes lateral, elevation, depth.
     inside : ndarray of shape (pixel,), bool
         Pixels that are used.
     points : ndarray of shape (n, 2)
         Points of :meth:`at_points`: lateral, axial, px.
     radius : float
-        Half-width of the weights around a point, px: two cubic B-splines in succession, knots a quarter of it apart.
+        Half-width of the weights around a point, px: two cubic B-splines in succession, knots a quarter of it apart; of
+        volumes two hat functions, knots a half of it apart.
     decibels : float
         Dynamic range that :func:`echotruth.tracking.grey.decompress` removed; it sets the amplitude of a grey level.
     """
 
     def __init__(self, positions: np.ndarray, inside: np.ndarray, points: np.ndarray, radius: float, decibels: float):
         self._inside, self._points, self._decibels = inside, points, decibels
-        self._lattice = lattice_around(positions, radius / 4)
+        is_flat = positions.shape[1] == 2
+        self._lattice: Any = (
+            lattice_around(positions, radius / 4) if is_flat else trilinear_lattice(positions, radius / 2)
+        )
+        self._cells: Any
         self._cells, self._order = self._lattice.sort_points(positions[inside])
 
     def at_points(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:

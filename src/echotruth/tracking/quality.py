@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from echotruth.tracking.accumulation import Path
+from echotruth.tracking.accumulation import Path, length
 
 IMAGE_FRACTION = 1 / 256
 """Error within which a point is near its true place, as a fraction of the longer side of the image."""
@@ -47,7 +47,7 @@ class ErrorModel:
     unseen: float = 0.0
     told: float = 0.0
 
-    def probability(self, path: Path, speckle: float, shape: tuple[int, ...]) -> np.ndarray:
+    def probability(self, path: Path, speckle: float, shape: tuple[float, ...]) -> np.ndarray:
         """Probability that points are within 1/256 of the side of the image of their true places.
 
         Parameters
@@ -55,15 +55,15 @@ class ErrorModel:
         path : Path
         speckle : float
             Correlation length of the speckle, px.
-        shape : tuple of int
-            Axial and lateral size of the image, px.
+        shape : tuple of float
+            Sides of the image, px.
 
         Returns
         -------
         ndarray of shape (frame, n)
             From 0 to 1; 1 at frame 0, NaN where the point is lost.
         """
-        probability = within(1.0, self.variance(squares(path, speckle, shape)))
+        probability = within(1.0, self.variance(squares(path, speckle, shape)), path.displacement.shape[-1])
         probability[0] = 1.0
         probability[~np.isfinite(path.displacement).all(-1)] = np.nan
         return probability
@@ -104,10 +104,10 @@ class Squares:
     told: np.ndarray
 
 
-def squares(path: Path, speckle: float, shape: tuple[int, ...]) -> Squares:
+def squares(path: Path, speckle: float, shape: tuple[float, ...]) -> Squares:
     """Terms of :class:`ErrorModel` for a path, with the arguments of :meth:`ErrorModel.probability`."""
     side = 1 / (IMAGE_FRACTION * max(shape))  # of a pixel
-    moved = side * np.hypot(*np.moveaxis(path.displacement, -1, 0))
+    moved = side * length(path.displacement)
     apart = np.minimum(side * np.nan_to_num(path.disagreement, nan=0.0), np.nan_to_num(moved)) ** 2
     known = np.isfinite(moved).sum(1, keepdims=True)
     wall = np.broadcast_to(apart.sum(1, keepdims=True) / np.maximum(known, 1), apart.shape)
@@ -122,9 +122,11 @@ ERRORS = {
     "dis": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
     "dis_fine": ErrorModel(0.335, 0.675, 0.207, 0.229, 0.0663, 0.0, 0.0),
     "bspline_dic": ErrorModel(0.172, 0.559, 0.259, 0.284, 0.0321, 0.196, 0.0),
+    "optical_flow_ilk": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
     "bspline_cnn": ErrorModel(0.0798, 0.202, 0.15, 0.19, 0.0, 0.113, 0.903),
 }
-"""Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`."""
+"""Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`.
+None is fitted on volumes: `bspline_dic` has there the one of images, and `optical_flow_ilk` that of `dis`."""
 
 
 def error_model(settings: Any) -> ErrorModel:
@@ -139,8 +141,10 @@ def error_name(settings: Any) -> str:
     return next((name for name in special if name in ERRORS), settings.method)
 
 
-def within(radius: float, variance: np.ndarray) -> np.ndarray:
-    """Probability 1 - exp(-r^2 / (2 s^2)) that a Gaussian error in the plane is within a radius.
+def within(radius: float, variance: np.ndarray, dimensions: int = 2) -> np.ndarray:
+    """Probability that a Gaussian error is within a radius: 1 - exp(-r^2 / (2 s^2)) in the plane.
+
+    In space it is the distribution of Maxwell, the regularised gamma function P(3/2, r^2 / (2 s^2)).
 
     Parameters
     ----------
@@ -148,10 +152,16 @@ def within(radius: float, variance: np.ndarray) -> np.ndarray:
         r, any unit.
     variance : ndarray of any shape
         s^2 of each coordinate, in the square of that unit; infinite for an unknown place.
+    dimensions : {2, 3}
 
     Returns
     -------
     ndarray of the same shape
     """
     with np.errstate(divide="ignore"):
-        return -np.expm1(-np.divide(radius**2, 2 * variance))
+        square = np.divide(radius**2, 2 * variance)
+    if dimensions == 2:
+        return -np.expm1(-square)
+    from scipy import special  # whoever brings a tracker needs none
+
+    return special.gammainc(1.5, square)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy import linalg, ndimage
@@ -9,8 +10,9 @@ from scipy.linalg import lapack
 
 from echotruth.tracking import alignment
 from echotruth.tracking.bending_energy import BendingEnergy, bending_matrix, wall_frame
-from echotruth.tracking.bspline import Cells, KnotLattice, lattice_around
+from echotruth.tracking.bspline import lattice_around
 from echotruth.tracking.evidence import PROBES, Match, effective_parameters, energy_weight
+from echotruth.tracking.flow import interpolate_field
 
 MAX_ITERATIONS = 24
 MATRIX_REUSE = 8
@@ -80,8 +82,8 @@ class WallRegion:
 
     Attributes
     ----------
-    lattice : KnotLattice
-    cells : Cells
+    lattice : bspline.KnotLattice
+    cells : bspline.Cells
         The pixels.
     positions : ndarray of shape (pixel, 2)
         Lateral, axial, px.
@@ -91,8 +93,8 @@ class WallRegion:
         Of a field without the shift, stretch, shear and rotation of the whole wall.
     """
 
-    lattice: KnotLattice
-    cells: Cells
+    lattice: Any
+    cells: Any
     positions: np.ndarray
     inside: np.ndarray
     energy: BendingEnergy
@@ -117,8 +119,10 @@ class WallRegion:
         ----------
         image : ndarray
             Spline coefficients of I, see :func:`echotruth.imaging.spline.coefficients`.
-        template : ndarray of shape (pixel,)
-            Grey values T.
+        template : ndarray of shape (pixel,) or (pixel, 1 + axis)
+            Grey values T, and their derivatives: if they are given, forces are by the mean of these and those of the
+            image (Benhimane and Malis 2004, IEEE/RSJ IROS, 943). Those of the image alone pull speckle that has changed
+            to where it is dark.
         start, previous : ndarray of shape (knot, 2)
             Coefficients of the initial estimate and of U_previous, px.
         smoothness : float, optional
@@ -139,12 +143,15 @@ class WallRegion:
         warped : ndarray of shape (pixel, 3)
             I(X + U), and its lateral and axial derivative per px.
         """
+        template, slopes = (template[:, 0], template[:, 1:]) if template.ndim == 2 else (template, None)
         coefficients, position = start, self.displaced(start)
-        normal: NormalMatrix | None = None
+        normal: Any = None
         shown = np.ones(len(template)) if seen is None else seen
         energy = self.energy.and_without(previous.ravel())
         for iteration in range(iterations):
-            warped = alignment.interpolate_with_gradient(image, position)
+            warped = self.interpolate(image, position)
+            if slopes is not None:
+                warped[:, 1:] = (warped[:, 1:] + slopes) / 2
             residual, weight, force = alignment.robust_match(warped, template, tolerance, shown)
             match = Match(template, residual, warped[:, 1:], weight)
             if (
@@ -159,7 +166,16 @@ class WallRegion:
             settled = smoothness is not None or iteration >= EVIDENCE_ITERATIONS[-1]
             if settled and np.linalg.norm(step) < CONVERGENCE * self.lattice.knot_spacing * np.sqrt(step.size):
                 break
-        return coefficients, alignment.interpolate_with_gradient(image, position)
+        return coefficients, self.interpolate(image, position)
+
+    def interpolate(self, image: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Grey value and derivatives (point, 3) at positions (point, 2), px, of an image of spline coefficients."""
+        return alignment.interpolate_with_gradient(image, position)
+
+    def sample(self, image: np.ndarray, position: np.ndarray) -> np.ndarray:
+        """Grey values (point,) of an image at positions (point, 2), px, linear between pixels; outside, its border."""
+        inside = np.clip(position, 0, np.array(image.shape[::-1]) - 1)
+        return interpolate_field(image[..., None], inside)[:, 0]
 
     def displaced(self, coefficients: np.ndarray) -> np.ndarray:
         """Positions (pixel, 2) of the pixels after the displacement with coefficients (knot, 2), px."""
@@ -200,11 +216,11 @@ class WallRegion:
         band, scale = self._image_matrix(self._flow_component, np.ones(len(self.positions)), 1)
         return _factor(band, scale, scale * FLOW_SMOOTHNESS, self.energy)
 
-    def _newton_step(self, normal: NormalMatrix, force: np.ndarray, field: np.ndarray) -> np.ndarray:
+    def _newton_step(self, normal: Any, force: np.ndarray, field: np.ndarray) -> np.ndarray:
         """Change of coefficients (knot, 2) from the image force (pixel, 2) and the energy of a field (knot, 2)."""
         force = self.cells.adjoint(force, self.lattice.size).ravel()
         change = -force - normal.energy_weight * normal.energy.gradient(field.ravel())
-        return normal.newton_step(change).reshape(-1, 2)
+        return normal.newton_step(change).reshape(field.shape)
 
     def _normal_matrix(
         self,
@@ -213,7 +229,7 @@ class WallRegion:
         energy: BendingEnergy,
         step: np.ndarray,
         before: NormalMatrix | None,
-    ) -> NormalMatrix:
+    ) -> Any:
         """Normal matrix of a match; its energy has the given smoothness, or the weight of :meth:`_evidence_weight`."""
         stride = max(1, len(self.positions) // (PIXELS_PER_CELL * len(self.cells.knots)))
         band, scale = self._image_matrix(match.gradient, match.weight, stride)

@@ -1,7 +1,10 @@
 """Size of the speckle in the image of a wall, which says how well a place can be found there."""
 
+from typing import Any
+
 import cv2
 import numpy as np
+from scipy import ndimage
 
 from echotruth.tracking.grey import DYNAMIC_RANGE, decompress, even_gain, grey_levels, rms
 
@@ -10,8 +13,8 @@ GAIN_SHARE, MEAN_SHARE = 0.05, 0.02
 over the side of the image: several speckles, and less than the wall."""
 
 
-def speckle_length(frame: np.ndarray, mask: np.ndarray) -> float:
-    """Correlation length l of the speckle in the wall, the quadratic mean of those along both axes, px.
+def speckle_length(frame: np.ndarray, mask: np.ndarray, ratio: Any = 1.0) -> float:
+    """Correlation length l of the speckle in the wall, the quadratic mean of those along all axes, px.
 
     A Gaussian correlation function exp(-x^2 / 2 l^2) has the mean square derivative var / l^2. By the bound of Cramer
     and Rao, a shift between two images of correlation rho has a variance in proportion to l^2 (1 / rho^2 - 1) along
@@ -20,10 +23,12 @@ def speckle_length(frame: np.ndarray, mask: np.ndarray) -> float:
 
     Parameters
     ----------
-    frame : ndarray of shape (axial, lateral)
+    frame : ndarray of shape (axial, lateral) or (depth, elevation, lateral)
         Any real type; NaN is taken as the darkest value.
-    mask : ndarray of shape (axial, lateral), bool
+    mask : ndarray of the same shape, bool
         The wall.
+    ratio : ndarray of shape (3,), optional
+        Of a volume, see :attr:`.tracker_input.TrackerInput.ratio`; the length is in the finest spacing.
 
     Returns
     -------
@@ -31,10 +36,19 @@ def speckle_length(frame: np.ndarray, mask: np.ndarray) -> float:
         1 without texture.
     """
     amplitude = decompress(np.nan_to_num(grey_levels(frame[None])[0]), DYNAMIC_RANGE)
-    side = max(mask.shape)
-    even = even_gain(amplitude, GAIN_SHARE * side, rms(amplitude[mask]))
+    pixel = np.broadcast_to(ratio, mask.ndim)[::-1]
+    side = max(np.array(mask.shape) * pixel)
+    even = even_gain(amplitude, GAIN_SHARE * side / (pixel if mask.ndim == 3 else 1), rms(amplitude[mask]))
     weight = mask.astype(np.float32)
-    blurred = [cv2.GaussianBlur(image, (0, 0), MEAN_SHARE * side) for image in (even * weight, weight)]
+    blurred = [_blurred(image, MEAN_SHARE * side / pixel) for image in (even * weight, weight)]
     variance = np.mean((even - blurred[0] / np.maximum(blurred[1], 1e-6))[mask] ** 2) if mask.any() else 0.0
-    slopes = [float(np.mean(slope[mask] ** 2)) for slope in np.gradient(even)] if variance > 0 else [0.0]
+    gradients = np.gradient(even, *pixel)
+    slopes = [float(np.mean(slope[mask] ** 2)) for slope in gradients] if variance > 0 else [0.0]
     return float(np.sqrt(np.mean(variance / np.array(slopes)))) if min(slopes) > 0 else 1.0
+
+
+def _blurred(image: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """An image or a volume blurred by a Gaussian, of which the standard deviation is given along each axis, px."""
+    if image.ndim == 2:
+        return cv2.GaussianBlur(image, (0, 0), float(deviation[0]))
+    return ndimage.gaussian_filter(image, deviation)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from echotruth.config.tracking import OUTSIDE, BsplineCnn
+from echotruth.config.tracking import OUTSIDE, VOLUMETRIC, BsplineCnn, OpticalFlowIlk, name_of
 from echotruth.extras import explained
 from echotruth.section import Section
 from echotruth.tracking import trackers
@@ -21,7 +21,7 @@ def track(
     frames: np.ndarray,
     points: np.ndarray,
     mask: np.ndarray,
-    spacing: float,
+    spacing: float | np.ndarray,
     frame_time: np.ndarray,
     seed: int,
     settings: Section,
@@ -32,13 +32,14 @@ def track(
     ----------
     frames : ndarray of shape (frame, axial, lateral)
         B-mode clip, any real type; frame 0 is end-diastole. Warns if the cycle is open, which is then tracked
-        forwards only unless its last frame is like the first.
+        forwards only unless its last frame is like the first. Or volumes, (frame, depth, elevation, lateral), of a
+        cycle that is taken to be closed; all vectors then have three components: lateral, elevation, depth.
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).
     mask : ndarray of shape (axial, lateral), bool
         The wall at end-diastole, as a reader of the image would draw it.
-    spacing : float
-        Distance of pixel centres, the same along both axes, m.
+    spacing : float, or ndarray of shape (3,)
+        Distance of pixel centres, the same along both axes, m; of volumes along lateral, elevation, depth.
     frame_time : ndarray of shape (frame,)
         Time since end-diastole, s.
     seed : int
@@ -61,7 +62,8 @@ def track(
     ValueError
         If there are fewer than two frames, or points, mask, spacing or times are invalid.
     TrackerFailed
-        If the method cannot process the clip, or an external tracker raises or returns an invalid result.
+        If the method cannot process the clip, as flat trackers cannot process volumes, or an external tracker raises or
+        returns an invalid result.
     """
     arrays = np.asarray(frames), np.asarray(points, float), np.asarray(mask, bool)
     clip = TrackerInput(*arrays, spacing, np.asarray(frame_time), seed)
@@ -78,6 +80,11 @@ def track(
 
 def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality of the points of a clip, by a method of ours or from outside."""
+    if clip.is_volume and type(settings) not in VOLUMETRIC:
+        names = " or ".join(name_of(each) for each in VOLUMETRIC)
+        raise ValueError(f"{settings.method} tracks flat images: volumes need {names}")
+    if isinstance(settings, OpticalFlowIlk) and not clip.is_volume:
+        raise ValueError(f"{settings.method} tracks volumes: flat images need another tracker, as dis")
     if isinstance(settings, OUTSIDE):
         return trackers.function(settings.method)(clip, settings)
     with explained(f"the tracker {settings.method}"):
@@ -87,16 +94,18 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         # The rounding of BLAS sums depends on the number of threads, but results must not.
         with threadpool_limits(1):
             path = tracked_path(clip, settings)
-            speckle = speckle_length(clip.frames[0], clip.mask)
-    return path.displacement, error_model(settings).probability(path, speckle, clip.shape)
+            speckle = speckle_length(clip.frames[0], clip.mask, clip.ratio)
+    quality = error_model(settings).probability(path, speckle, (clip.side,))
+    return path.displacement / clip.ratio, quality
 
 
 def tracked_path(clip: TrackerInput, settings: Any) -> Path:
     """Path of the points of a clip by a method of ours.
 
-    If the tissue of the last frame cannot be followed to the first, it is tracked forwards only.
+    If the tissue of the last frame cannot be followed to the first, it is tracked forwards only. Volumes are not looked
+    at for that.
     """
-    both_ways = getattr(settings, "reference", None) == "bidirectional"
+    both_ways = getattr(settings, "reference", None) == "bidirectional" and not clip.is_volume
     if both_ways or isinstance(settings, BsplineCnn):
         from echotruth.tracking.closure import closure
 

@@ -1,6 +1,7 @@
 """What every tracker is given."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,31 +19,54 @@ class TrackerInput:
     frames: np.ndarray
     points: np.ndarray
     mask: np.ndarray
-    spacing: float
+    spacing: Any
     frame_time: np.ndarray
     seed: int
     is_closed: bool = True
 
     def __post_init__(self) -> None:
-        frames, times = self.frames, self.frame_time
-        if frames.ndim != 3 or len(frames) < 2:
-            raise ValueError(f"A clip needs two or more frames, shape (frame, axial, lateral), not {frames.shape}.")
-        infinite = np.isinf(frames).any(axis=(1, 2))
+        frames, times, size = self.frames, self.frame_time, self.frames.ndim - 1
+        if size not in (2, 3) or len(frames) < 2:
+            raise ValueError(
+                "A clip needs two or more frames, shape (frame, axial, lateral) or, of volumes, (frame, depth, "
+                f"elevation, lateral), not {frames.shape}."
+            )
+        infinite = np.isinf(frames).any(axis=tuple(range(1, frames.ndim)))
         if infinite.any():
             frame = np.argmax(infinite)
             raise ValueError(
                 f"Frame {frame} has pixels that are infinite: give numbers, or NaN where there is no image."
             )
-        if self.points.ndim != 2 or self.points.shape[1] != 2:
-            raise ValueError(f"Points must have the shape (point, 2), not {self.points.shape}.")
+        if self.points.ndim != 2 or self.points.shape[1] != size:
+            raise ValueError(f"Points must have the shape (point, {size}), not {self.points.shape}.")
         if self.mask.shape != self.shape:
             raise ValueError(f"The mask must have the shape of a frame, {self.shape}, not {self.mask.shape}.")
-        if not (np.isfinite(self.spacing) and self.spacing > 0):
-            raise ValueError(f"The pixel spacing must be a positive length in metres, not {self.spacing}.")
+        spacing = np.asarray(self.spacing)
+        if spacing.shape != (() if size == 2 else (3,)) or not (np.isfinite(spacing) & (spacing > 0)).all():
+            lengths = "a positive length" if size == 2 else "positive lengths (lateral, elevation, depth)"
+            raise ValueError(f"The pixel spacing must be {lengths} in metres, not {self.spacing}.")
         if times.shape != frames.shape[:1] or not (np.diff(times) > 0).all():
             raise ValueError(f"The {len(frames)} frames need {len(frames)} increasing times, not {times}.")
 
     @property
-    def shape(self) -> tuple[int, int]:
-        """Axial and lateral size of a frame, px."""
-        return self.frames.shape[1:]  # type: ignore[return-value]
+    def shape(self) -> Any:
+        """Axial and lateral size of a frame, px; of a volume depth, elevation and lateral size."""
+        return self.frames.shape[1:]
+
+    @property
+    def is_volume(self) -> bool:
+        """Whether the frames are volumes."""
+        return self.frames.ndim == 4
+
+    @property
+    def ratio(self) -> np.ndarray:
+        """Spacing along lateral, elevation, depth over the finest, (3,); 1 for flat images, whose pixels are square.
+
+        Trackers measure lengths of volumes in the finest spacing: points and displacements in voxels times this.
+        """
+        return np.asarray(self.spacing) / np.min(self.spacing) if self.is_volume else np.array(1.0)
+
+    @property
+    def side(self) -> float:
+        """The longer side of a frame, in the finest spacing, px."""
+        return float(np.max(np.array(self.shape[::-1]) * self.ratio))

@@ -43,8 +43,7 @@ from echotruth.config.tracking import BsplineDic
 from echotruth.imaging import spline
 from echotruth.threads import each
 from echotruth.tracking import bidirectional
-from echotruth.tracking.accumulation import Path, step_variance
-from echotruth.tracking.alignment import interpolate_with_gradient
+from echotruth.tracking.accumulation import Path, length, step_variance
 from echotruth.tracking.flow import interpolate_field
 from echotruth.tracking.grey import decompress, even_gain, grey_levels, rms
 from echotruth.tracking.ncc import NormalizedCrossCorrelation
@@ -106,13 +105,19 @@ class WallTrajectory:
 
 def track(clip: TrackerInput, settings: BsplineDic) -> Path:
     """Path of the points of a clip; those outside the wall and its surroundings are lost."""
-    return lost(clip) if not clip.mask.any() else follow(clip, settings).path
+    if not clip.mask.any():
+        return lost(clip)
+    if clip.is_volume:
+        from echotruth.tracking.volume import follow_volume  # it is built of what is here
+
+        return follow_volume(clip, settings).path
+    return follow(clip, settings).path
 
 
 def lost(clip: TrackerInput) -> Path:
     """Path of points of which none is found."""
     unknown = np.full((len(clip.frames), len(clip.points)), np.nan)
-    return Path(np.stack([unknown, unknown], -1), unknown, unknown, unknown)
+    return Path(np.stack([unknown] * clip.mask.ndim, -1), unknown, unknown, unknown)
 
 
 def follow(clip: TrackerInput, settings: BsplineDic) -> "BothWays":
@@ -218,7 +223,7 @@ class WallTracker:
 
     region: WallRegion
     ncc: NormalizedCrossCorrelation
-    pixels: NormalizedCrossCorrelation
+    pixels: NormalizedCrossCorrelation | None
     coarse: np.ndarray
     block: int
     images: list[np.ndarray]
@@ -229,8 +234,9 @@ class WallTracker:
 
     def track(self, order: Sequence[int]) -> WallTrajectory:
         """Track the wall through the frames in an order that begins with end-diastole."""
-        coefficients, variance = np.zeros((len(order), self.region.lattice.size, 2)), np.zeros(len(order))
-        warped = interpolate_with_gradient(self.images[0], self.region.positions)
+        coefficients = np.zeros((len(order), self.region.lattice.size, self.region.positions.shape[1]))
+        variance = np.zeros(len(order))
+        warped = self.region.interpolate(self.images[0], self.region.positions)
         template = latest = self._template(0, coefficients[0], warped)
         amplitude = {0: self._amplitude(0, coefficients[0])}
         ncc = [self.ncc.at_points(amplitude[0], amplitude[0])] * len(order)
@@ -248,7 +254,7 @@ class WallTracker:
             amplitude[now] = self._amplitude(now, fitted)
             ncc[now] = self.ncc.at_points(amplitude[template.frame], amplitude[now])
             decorrelation[now] = decorrelation[template.frame] + step_variance(ncc[now])
-            if self.visible is None:
+            if self.visible is None and self.pixels is not None:
                 alike = self.pixels.at_points(template.warped[:, 0], warped[:, 0])
                 likeness.append((self.region.displaced(fitted)[::LIKENESS_STRIDE], alike))
             if np.isfinite(variance[now]):
@@ -259,7 +265,7 @@ class WallTracker:
         seen = self._seen(coefficients)
         if not self.blurred:
             return Template(frame, warped, None, seen)
-        blurred = interpolate_with_gradient(self.blurred[frame], self.region.displaced(coefficients))
+        blurred = self.region.interpolate(self.blurred[frame], self.region.displaced(coefficients))
         return Template(frame, warped, blurred[:, 0], seen)
 
     def _seen(self, coefficients: np.ndarray) -> np.ndarray | None:
@@ -268,9 +274,7 @@ class WallTracker:
 
     def _amplitude(self, frame: int, coefficients: np.ndarray) -> np.ndarray:
         """Amplitudes (pixel,) of a frame at the displaced pixels; outside the image those of its border."""
-        image = self.amplitudes[frame]
-        inside = np.clip(self.region.displaced(coefficients), 0, np.array(image.shape[::-1]) - 1)
-        return interpolate_field(image[..., None], inside)[:, 0]
+        return self.region.sample(self.amplitudes[frame], self.region.displaced(coefficients))
 
     def _ncc(self, template: Template, warped: np.ndarray) -> float:
         return self.ncc.overall(template.warped[:, 0], warped[:, 0])
@@ -293,7 +297,11 @@ class WallTracker:
             image = self.blurred[frame]
             coarse, _ = self.region.align(image, template.blurred, start, previous, *how, COARSE_ITERATIONS, seen)
             start = self._best(frame, template, start, coarse)
-        return self.region.align(self.images[frame], template.warped[:, 0], start, previous, *how, seen=seen)
+        return self.region.align(self.images[frame], self._aligned_to(template), start, previous, *how, seen=seen)
+
+    def _aligned_to(self, template: Template) -> np.ndarray:
+        """What of a template an image is aligned to: its grey values."""
+        return template.warped[:, 0]
 
     def _predict(self, now: int, before: int, coefficients: np.ndarray, template: Template) -> np.ndarray:
         """Coefficients advanced by the dense flow, or unchanged if they then match the template better."""
@@ -306,7 +314,7 @@ class WallTracker:
         """The field with the smallest mean absolute difference between image and template."""
 
         def difference(coefficients: np.ndarray) -> float:
-            warped = interpolate_with_gradient(self.images[frame], self.region.displaced(coefficients))
+            warped = self.region.interpolate(self.images[frame], self.region.displaced(coefficients))
             return float(np.abs(warped[:, 0] - template.warped[:, 0]).mean())
 
         return min(fields, key=difference)
@@ -358,7 +366,7 @@ class BothWays:
             variance, disagreement = forward.decorrelation, np.full_like(correlation, np.nan)
         else:
             variance = bidirectional.mean_variance(weight, forward.decorrelation, backward.decorrelation)
-            disagreement = np.hypot(*np.moveaxis(self.displacements[0] - self.displacements[1], -1, 0))
+            disagreement = length(self.displacements[0] - self.displacements[1])
         path = Path(displacement, correlation, variance, disagreement)
         if self.visible is None:
             return path
@@ -370,4 +378,4 @@ def _displacement(region: WallRegion, points: np.ndarray, trajectory: WallTrajec
     """Displacement (frame, n, 2) of points, px."""
     frames = len(trajectory.coefficients)
     flat = trajectory.coefficients.transpose(1, 0, 2).reshape(region.lattice.size, -1)
-    return np.moveaxis(region.lattice.evaluate(flat, points).reshape(len(points), frames, 2), 0, 1).copy()
+    return np.moveaxis(region.lattice.evaluate(flat, points).reshape(len(points), frames, points.shape[1]), 0, 1).copy()
