@@ -18,3 +18,7 @@ from echotruth.workflow.processes import cache, guard_cache  # noqa: E402 - it i
 
 os.environ["NUMBA_CACHE_DIR"] = str(cache())  # that of jobs, wherever they run
 guard_cache()
+
+import numba  # noqa: E402 - it reads where the cache is
+
+numba.set_num_threads(1)  # the other cores are those of other workers

@@ -28,7 +28,11 @@ def with_keys(monkeypatch):
     return lambda **keys: monkeypatch.setattr(et, "beat", lambda config: beat(et.configure(config, **keys)))
 
 
-def test_heart_ejects_what_its_loop_prescribes():
+COARSE = {"circumferential_elements": 6, "longitudinal_elements": 4}
+
+
+def test_heart_ejects_what_its_loop_prescribes(with_keys):
+    with_keys(geometry=COARSE)
     volume = read_loop(Config(loop={"frames": 10}).loop).volume
     found = run("ejection_fraction")["ejection_fraction"]
     assert found == pytest.approx(1 - volume.min() / volume[0], abs=2e-3)
@@ -36,14 +40,14 @@ def test_heart_ejects_what_its_loop_prescribes():
 
 
 def test_infarct_is_stretched_while_the_rest_shortens(with_keys):
-    with_keys(geometry={"circumferential_elements": 6, "longitudinal_elements": 4})
+    with_keys(geometry=COARSE)
     found = run("infarct")
     assert found["infarct"] > 0.01
     assert found["remote"] < -0.05
 
 
 def test_cross_section_of_a_tube_that_keeps_its_volume_grows_as_it_shortens(with_keys):
-    with_keys(phantom={"density_per_mm3": 30.0}, rf={"lines": 16})
+    with_keys(phantom={"density_per_mm3": 30.0}, probe={"elements": 16}, rf={"lines": 16})
     assert run("incompressible_tube")["area_ratio"] == pytest.approx(1 / 0.85, rel=0.01)
 
 
@@ -69,11 +73,14 @@ def test_example_of_a_repository_shows_that_an_infarct_lowers_strain_and_ejectio
     assert (np.abs(healthy) > np.abs(infarct)).all()
 
 
+def with_fewer_scatterers(monkeypatch):
+    configure, sparse = et.configure, {"density_per_mm3": 100.0}
+    monkeypatch.setattr(et, "configure", lambda *given, **keys: configure(configure(*given, **keys), phantom=sparse))
+
+
 @pytest.mark.slow
 def test_blocks_of_the_page_about_python_run_one_after_the_other(monkeypatch):
-    """With fewer scatterers."""
-    configure, sparse = et.configure, {"density_per_mm3": 300.0}
-    monkeypatch.setattr(et, "configure", lambda *given, **keys: configure(configure(*given, **keys), phantom=sparse))
+    with_fewer_scatterers(monkeypatch)
     page, names = (EXAMPLES.parent / "docs/python.md").read_text(), {}
     blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     for block in blocks:
@@ -88,6 +95,7 @@ def test_block_of_the_page_about_motion_from_files_runs_on_a_series(tmp_path, mo
     import pyvista
 
     monkeypatch.chdir(tmp_path)
+    with_fewer_scatterers(monkeypatch)
     for frame, a in enumerate(np.sin(np.pi * np.arange(8) / 8) ** 2):
         nodes = 1e3 * coarse_mesh.nodes * (1 - a * np.array([0.2, 0.2, 0.1]))
         pyvista.UnstructuredGrid({24: coarse_mesh.cells.astype(np.int64)}, nodes).save(f"heart_{frame}.vtu")

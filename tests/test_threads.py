@@ -24,10 +24,9 @@ def counted(length):
 
 @pytest.fixture(params=[1, 2])
 def threads(request):
-    before = numba.get_num_threads()
-    numba.set_num_threads(min(request.param, before))
+    numba.set_num_threads(min(request.param, numba.config.NUMBA_NUM_THREADS))
     yield
-    numba.set_num_threads(before)
+    numba.set_num_threads(1)
 
 
 @pytest.mark.parametrize("length", [0, 1, 2, 7, 1000])
@@ -48,7 +47,7 @@ def test_results_come_in_the_order_of_the_items_from_as_many_threads_as_numba_us
     assert (threading.get_ident() in idents) == (allowed == 1)
 
 
-def test_error_in_a_thread_is_raised():
+def test_error_in_a_thread_is_raised(threads):
     def fail(part):
         raise ValueError("no")
 
@@ -57,7 +56,7 @@ def test_error_in_a_thread_is_raised():
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
-def test_a_forked_process_has_threads_of_its_own():
+def test_a_forked_process_has_threads_of_its_own(threads):
     counted(8)  # threads of this process
     with multiprocessing.get_context("fork").Pool(1) as pool:
         assert pool.apply_async(counted, (8,)).get(timeout=60).tolist() == [1] * 8

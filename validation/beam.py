@@ -24,7 +24,7 @@ MODEL = ConstitutiveModel(LAWS["fung"].Law(fibre=8.0, transverse=2.0, shear=4.0)
 PRESSURE = 4.0
 """Pa."""
 
-LOAD_STEPS = 12
+LOAD_STEPS = 6
 """Equal steps of the pressure."""
 
 TIP_HEIGHT = 4.18e-3

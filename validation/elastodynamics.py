@@ -125,7 +125,7 @@ def measure(quick: bool = False) -> Results:
 
     If `quick`, its beginning on a coarse mesh, without the first of these.
     """
-    (around, *more), end = ((6, 6, 1), TIMES[1]) if quick else ((24, 12, 1), END)
+    (around, *more), end = ((6, 4, 1), TIMES[1]) if quick else ((24, 12, 1), END)
     coarse = ventricle(around, *more)
     beats = solve(f"plane, {around} around", facetted(coarse), end), solve(f"curved, {around} around", coarse, end)
     if not quick:

@@ -171,11 +171,11 @@ class AxisymmetricBody:
         def stress(f: Floats) -> Floats:
             return first_piola_kirchhoff(f @ np.swapaxes(self.axes, -1, -2), model.density) @ self.axes
 
-        modulus, step = np.empty((*f.shape[:2], 9, 9)), 1e-6
+        found, modulus, step = stress(f), np.empty((*f.shape[:2], 9, 9)), 1e-7
         for r in range(9):
             change = step * np.eye(9)[r].reshape(3, 3)
-            modulus[..., r] = ((stress(f + change) - stress(f - change)) / (2 * step)).reshape(*f.shape[:2], 9)
-        return stress(f), modulus
+            modulus[..., r] = ((stress(f + change) - found) / step).reshape(*f.shape[:2], 9)
+        return found, modulus
 
     def _cavity(self, motion: Floats) -> tuple[Floats, Floats]:
         """First and second derivative of the volume of the cavity, int pi r^2 dz, edge by edge."""

@@ -27,18 +27,6 @@ def test_keys_that_conflict_are_told_together():
     assert [line.split(" ")[0] for line in refused(values)] == ["rf.focus_mm", "views", "fibres.source"]
 
 
-def test_value_of_several_types_has_one_error():
-    values = {"geometry": {"file": "a.vtu", "wall_cells": {"array": "part", "values": [1.5, None, "a"]}}}
-    assert [line.partition(":")[0] for line in refused(values)] == [
-        "geometry.wall_cells.values.0 = 1.5",
-        "geometry.wall_cells.values.1 = null",
-    ]
-
-
-def test_names_that_are_those_of_types_stay_in_the_key():
-    assert refused({"views": {"int": {"plane": 3}, "str": {"position": 2.0}}})[0].startswith("views.int.plane = 3")
-
-
 def test_many_errors_are_cut_and_counted():
     lines = refused({"views": {f"v{number}": {"position": 2.0} for number in range(30)}})
     assert len(lines) == MAX_ERRORS + 1 and lines[-1] == "at least 10 more errors: correct these first"

@@ -32,9 +32,9 @@ def demo(tmp_path_factory):
 
 
 COARSE = {
-    "geometry": {"circumferential_elements": 12, "longitudinal_elements": 6, "transmural_elements": 1},
+    "geometry": {"circumferential_elements": 6, "longitudinal_elements": 4, "transmural_elements": 1},
     **{"loop": {"frames": 4}, "bmode": {"size_px": 128, "downsampling": (1,)}, "rf": {"lines": 24, "focal_zones": 1}},
-    "phantom": {"density_per_mm3": 300.0},
+    "phantom": {"density_per_mm3": 100.0},
 }
 """Heart and images that are made in seconds."""
 

@@ -42,7 +42,7 @@ def command(line):
     _, name, *arguments = shlex.split(line)
     if name == "run":
         parser().parse_known_args([name, *arguments])
-        learning_repository.make(Path("out/first"), CONFIGURE(arguments[0], loop={"frames": 6}))
+        learning_repository.make(Path("out/first"), CONFIGURE(et.configure(arguments[0]), loop={"frames": 6}))
     else:
         assert run_cli(name, *arguments, cwd=Path.cwd())[0] == 0
 

@@ -128,15 +128,3 @@ def test_hearts_of_the_notebooks_are_four_in_groups_that_a_split_can_part(monkey
     monkeypatch.chdir(ROOT / "docs/notebooks")
     cases = et.expand(et.configure("first.yaml"))
     assert [case.id for case in cases] == ["healthy_1", "healthy_2", "infarct_1", "infarct_2"]
-
-
-def test_page_of_the_code_answers_28_questions_with_files_that_are_there():
-    rows = re.findall(r"^\| .*\? \| (.*) \|$", (ROOT / "docs/where.md").read_text(), re.MULTILINE)
-    assert len(rows) == 28
-    named = [path for row in rows for path in re.findall(r"`(.+?)`", row)]
-    assert [path for path in named if not any((top / path).exists() for top in (ROOT, ROOT / "src/echotruth"))] == []
-
-
-def test_page_of_scripts_shows_every_example():
-    shown = set(re.findall(r"literalinclude\} /examples/(\S+)", (ROOT / "docs/examples.md").read_text()))
-    assert shown == {path.name for path in (ROOT / "examples").glob("*.py")}

@@ -14,7 +14,6 @@ from PIL import Image
 import echotruth as et
 from echotruth.echo.drawing import MAX_BODY, Drawing, DrawingServer
 from echotruth.echo.wall import write_wall
-from echotruth.echo.wall_file import default_output
 
 SHAPE, CENTRE, RADII = (90, 120), np.array([60.0, 45.0]), (20.0, 32.0)
 INSERTIONS = {"anterior_insertion": [33.0, 28.0], "inferior_insertion": [33.0, 62.0]}
@@ -261,10 +260,3 @@ def test_wall_without_a_named_view_needs_one(tmp_path):
     (tmp_path / "c.csv").write_text(text.replace("basal", "bsal"))
     with pytest.raises(et.EchoError, match=r"c.csv: view = 'bsal': use one of basal"):
         et.read_wall(tmp_path / "c.csv")
-
-
-def test_default_output_is_beside_the_clip(tmp_path):
-    (tmp_path / "images.d").mkdir()
-    names = {"a.dcm": "a", "a.NII.GZ": "a", "a.b.mp4": "a.b", "IM_0001": "IM_0001", "images.d": "images.d"}
-    for clip, stem in names.items():
-        assert default_output(tmp_path / clip) == tmp_path / f"{stem}.wall.csv"

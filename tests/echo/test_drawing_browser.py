@@ -208,23 +208,3 @@ def test_end_diastole_is_chosen_saved_and_drawn_in(page, folder, address):
     assert et.read_wall(folder / "clip.wall.csv").part == "cycle 1 4, crop 0 0 320 240"
     load(page, address)
     assert page.evaluate("echotruth.frame") == 1 and "1 / 4" in page.locator("#time").inner_text()
-
-
-def test_nothing_is_wider_than_the_window_of_a_phone(page):
-    page.set_viewport_size({"width": 390, "height": 844})
-    page.wait_for_timeout(300)
-    assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    hint = page.locator("#message")
-    assert hint.evaluate("text => text.scrollWidth <= text.clientWidth")
-    assert page.locator("#canvas").bounding_box()["height"] > 350
-
-
-def test_clip_plays_and_a_click_goes_back_to_its_first_frame(page):
-    page.locator("#play").click()
-    page.wait_for_function("() => echotruth.frame === 3", timeout=PATIENCE)
-    click(page, CENTRE)
-    page.wait_for_function("() => echotruth.frame === 0", timeout=PATIENCE)
-    assert page.locator("#clear").is_disabled()  # the click drew nothing
-    page.locator("#frame").focus()
-    page.keyboard.press("ArrowRight")
-    page.wait_for_function("() => echotruth.frame === 1", timeout=PATIENCE)

@@ -11,8 +11,6 @@ from PIL import Image
 
 import echotruth as et
 from echotruth.cli import main
-from echotruth.cli.track import TRACKERS
-from echotruth.config.tracking import BUILTIN
 from echotruth.echo import page
 from echotruth.echo.failure import EchoError
 from echotruth.echo.wall import write_wall
@@ -247,10 +245,6 @@ def many(ring, tmp_path, monkeypatch):
         Image.fromarray(mask).save(tmp_path / f"{name}.png")
     monkeypatch.chdir(tmp_path)
     return ("--spacing-mm", "0.04", "--frame-time-ms", "10", "--tracker", "dis", "--view", "mid")
-
-
-def test_trackers_of_the_help_are_those_that_are_known():
-    assert set(TRACKERS) == {*BUILTIN, *et.configure().tracking.trackers} - {"optical_flow_ilk"}, "of volumes"
 
 
 def test_clip_is_tracked_from_the_frame_that_was_drawn_in_and_its_strain_marked_as_doubtful(

@@ -90,14 +90,6 @@ def test_either_side_of_the_plane_is_alike(lens):
     np.testing.assert_array_equal(one[0], other[0])
 
 
-def test_it_is_looked_up_between_the_least_and_the_greatest_curvature(lens):
-    half, lateral = 31.5e-6 * Probe().pitch_um, np.array([0.0, 1e-3, -3e-3])
-    _, terms = lens.lens_terms(np.stack([lateral, np.full(3, 5e-3), np.zeros(3)], axis=1), 1540.0)
-    elements = np.linspace(-half, half, 20001)
-    curvature = 1 / np.hypot(lateral[:, None] - elements, 5e-3)
-    np.testing.assert_allclose(terms[:, 0], (curvature.min(axis=1) + curvature.max(axis=1)) / 2, rtol=1e-6)
-
-
 def test_echoes_from_near_the_array_or_far_beside_its_plane_are_not_spread(lens):
     aside = np.array([3e-3, 0.0, 0.0])
     assert lens.spreads(at(np.array([0.0, 0.2e-3, 1.4e-3]), 6.5e-3) + aside).tolist() == [True, True, False]

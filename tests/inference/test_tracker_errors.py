@@ -45,7 +45,7 @@ def test_bias_gain_and_variances_of_many_hearts_are_those_they_were_drawn_with(g
 
 
 @pytest.mark.parametrize("common", [0.03, 0.003])
-@pytest.mark.parametrize("hearts", [3, 20])
+@pytest.mark.parametrize("hearts", [3, 8])
 def test_intervals_of_few_hearts_are_wide_enough_for_the_next_one(hearts, common):
     drawn = {"common": common, "own": 0.01, "gain": 0.7}
     random, of_mean, of_segment = np.random.default_rng(hearts), [], []

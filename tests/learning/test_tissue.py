@@ -25,6 +25,7 @@ def folder(tmp_path_factory):
     motion = Motion(kind="affine", affine=Affine(gradient=learning_repository.GRADIENT))
     config = configured(
         name="tissues",
+        views=("mid",),
         cases={"realism.preset": ["none", "mouse"]},
         bmode=Bmode(size_px=64, downsampling=(2,)),
         motion=motion,

@@ -114,11 +114,10 @@ def test_given_stiffness_scales_the_volumes():
 
 
 def test_few_frames_converge_and_bytes_do_not_depend_on_threads():
-    before, runs = numba.get_num_threads(), []
-    for threads in (1, before):
+    runs = []
+    for threads in (numba.config.NUMBA_NUM_THREADS, 1):
         numba.set_num_threads(threads)
         runs.append(beat(Config(geometry=COARSE, loop=Loop(frames=10))))
-    numba.set_num_threads(before)
     for group, arrays in runs[0].items():
         for name, values in arrays.items():
             assert values.tobytes() == runs[1][group][name].tobytes(), f"{group}/{name}"

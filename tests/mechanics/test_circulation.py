@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from echotruth.config import Config
-from echotruth.config.diagnosis import BOUNDS_OF, bounds_of, findings
+from echotruth.config.diagnosis import BOUNDS_OF, bounds_of
 from echotruth.heart import Heart
 from echotruth.loop.calibration import calibrate
 from echotruth.loop.circulation import ARTERIES, LEFT_VENTRICLE
@@ -56,11 +56,10 @@ def assert_valve_is_healthy(mechanics):
 SEGMENTS = [7, 8, 12, 13, 14]
 DISEASES = {
     "healthy": {},
-    **{age: {"pathology": {"infarct": {"segments": SEGMENTS, "age": age}}} for age in ("fresh", "old")},
+    "old": {"pathology": {"infarct": {"segments": SEGMENTS, "age": "old"}}},
     "lbbb": {"pathology": {"activation": {"preset": "lbbb"}}},
     "dcm": {"pathology": {"preset": "dcm"}},
     "hypertension": {"pathology": {"preset": "hypertension"}},
-    "weak": {"contractility": 0.7},
 }
 
 
@@ -152,13 +151,12 @@ def test_heart_is_within_the_bounds_of_its_diagnosis(species, disease):
     config, arrays, _, values = diseased(disease, species)
     assert violation(values, bounds_of(config)) == ""
     assert_valve_is_healthy(arrays["mechanics"])
-    # What is healthy, weak by a little, or compensated may be that of a healthy heart; the others are not.
-    severe = {"fresh_infarct", "old_infarct", "late_activation", "dcm"} & set(findings(config))
-    assert bool(violation(values, config.physiology)) or not severe
+    # Nor is it that of a healthy heart.
+    assert violation(values, config.physiology)
 
 
 @pytest.mark.parametrize(
-    "disease", ["dcm", *(pytest.param(each, marks=pytest.mark.slow) for each in ("hypertension", "fresh", "lbbb"))]
+    "disease", ["dcm", *(pytest.param(each, marks=pytest.mark.slow) for each in ("hypertension", "old", "lbbb"))]
 )
 def test_stored_arrays_are_in_balance(disease):
     """Force of every frame by energies written down anew: the pericardium and taut scars rest at frame 0."""
@@ -167,11 +165,10 @@ def test_stored_arrays_are_in_balance(disease):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("species", ["mouse", "human"])
-def test_grown_hearts_are_those_of_their_disease(species):
+def test_grown_hearts_are_those_of_their_disease():
     """Concentric growth: end-systolic pressure and wall rise, EF is kept, GLS falls. Eccentric growth: wide, weak and
     congested, with what moves before ejection small."""
-    hearts = [diseased(disease, species) for disease in ("healthy", "hypertension", "dcm")]
+    hearts = [diseased(disease, "mouse") for disease in ("healthy", "hypertension", "dcm")]
     before, pressed, dilated = (arrays["mechanics"] for _, arrays, _, _ in hearts)
     sound, thick, wide = (found for _, _, found, _ in hearts)
     es = [one["pressure"][int(one["es_frame"])] for one in (before, pressed)]
@@ -180,7 +177,7 @@ def test_grown_hearts_are_those_of_their_disease(species):
     assert sound["gls"] + 0.005 < thick["gls"] < 0
     assert 0.2 < wide["ejection_fraction"] < 0.35
     assert dilated["volume"][0] > 1.6 * before["volume"][0]
-    assert dilated["pressure"][0] > {"mouse": 10, "human": 15}[species] * 133.322
+    assert dilated["pressure"][0] > 10 * MMHG
     assert np.ptp(dilated["volume"]) < np.ptp(before["volume"])
     assert np.abs(wide["level_strain_ivc"][:, 1]).max() < 0.03
 
@@ -203,11 +200,10 @@ def test_late_wall_is_stretched_and_overtakes_the_septum():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("age", ["fresh", "old"])
-def test_infarct_hardly_bulges_and_the_wall_away_from_it_shortens_less(age):
+def test_infarct_hardly_bulges_and_the_wall_away_from_it_shortens_less():
     """As in mice after a day (Epstein 2002), whose ejection fraction falls and whose remote wall weakens."""
     _, normal, _, _ = diseased("healthy", "mouse")
-    _, arrays, _, _ = diseased(age, "mouse")
+    _, arrays, _, _ = diseased("old", "mouse")
     curves, region = arrays["mechanics"], arrays["pathology"]["region"]
     es, ivc = int(curves["es_frame"]), np.flatnonzero(curves["phase"] == CONTRACTION)[-1]
     strain = arrays["kinematics"]["strain"][..., 1].astype(float)
@@ -225,7 +221,7 @@ def test_infarct_hardly_bulges_and_the_wall_away_from_it_shortens_less(age):
 @pytest.mark.slow
 def test_steady_beat_does_not_depend_on_how_it_is_sought(monkeypatch):
     """Not on the elastance between the beats, nor on how near the rough ones come: this one is thrice as stiff."""
-    config = heart(frames=12, contractility=0.7, beats_max=40)
+    config = heart(frames=8, contractility=0.8, beats_max=40)
     monkeypatch.setattr(solver, "STEADY", 1e-3)
     found, _ = measured(config)
     monkeypatch.setattr(solver, "ROUGH_TOLERANCE", 1e-8)
@@ -248,7 +244,7 @@ def test_blood_is_kept_from_beat_to_beat(monkeypatch):
         couple(stepper, circulation, volumes)
 
     monkeypatch.setattr(LoadStepper, "couple", recorded)
-    config = heart(frames=12, contractility=0.7, retained_volume_stroke_volumes=retained)
+    config = heart(frames=8, contractility=0.7, retained_volume_stroke_volumes=retained)
     measured(config)
     cycle = read_loop(config.loop)
     calibrated, _ = calibrate(cycle, config.loop.circulation)
@@ -283,7 +279,7 @@ def test_beat_that_no_way_leads_to_from_the_last_frame_begins_at_rest(weak, monk
 
 def test_heart_that_is_not_steady_in_time_is_refused():
     with pytest.raises(Diverged, match=r"not steady after 1 beats .*raise loop.circulation.beats_max"):
-        beat(heart(frames=12, resistance=1.5, beats_max=1))
+        beat(heart(frames=6, resistance=1.5, beats_max=1))
 
 
 @pytest.mark.parametrize("contractility", [1.0, 0.6])

@@ -116,8 +116,9 @@ def test_heart_that_is_larger_by_a_factor_moves_alike():
     """What has a length apart from the shape, springs and dashpots over an area, is scaled too."""
     factor, support = 1.3, CONFIG.mechanics.pericardium
     soft = {key: value / factor for key, value in support.model_dump().items()}
-    large = configure(CONFIG, geometry={"scale": factor}, mechanics={"pericardium": soft})
-    of_small, of_large = (beat(config)["mechanics"] for config in (CONFIG, large))
+    small = configure(CONFIG, loop={"frames": 6})
+    large = configure(small, geometry={"scale": factor}, mechanics={"pericardium": soft})
+    of_small, of_large = (beat(config)["mechanics"] for config in (small, large))
     np.testing.assert_allclose(of_large["volume"], factor**3 * of_small["volume"], rtol=1e-6)
     np.testing.assert_allclose(of_large["active_tension"], of_small["active_tension"], rtol=1e-4, atol=1.0)
     moved = factor * of_small["displacement"]
@@ -165,7 +166,7 @@ def test_heart_that_cannot_be_filled_is_told_a_volume_and_a_size_that_work():
     volume, factor = map(float, re.search(r"edv_uL of ([\d.]+) or more, or ([\d.]+) of this", told).groups())
     assert "geometry.scale = 1.3 (0.88 to 1.12)" in told
     for remedy in ({"loop.edv_uL": volume}, {"geometry.scale": 1.3 * factor}):
-        beat(configure(small, **remedy))
+        filled(configure(small, **remedy))
 
 
 def test_wall_of_rubber_is_filled_and_one_too_soft_for_the_pressure_is_told_so():
@@ -179,7 +180,7 @@ def test_wall_of_rubber_is_filled_and_one_too_soft_for_the_pressure_is_told_so()
 @pytest.mark.slow
 def test_heart_that_is_asked_for_more_than_muscle_bears_is_told_how_far_it_may_eject():
     active = {"length_dependence": 2.0}
-    config = CONFIG.model_copy(update={"loop": Loop(frames=20, esv_uL=6.0), "mechanics": Mechanics(active=active)})
+    config = CONFIG.model_copy(update={"loop": Loop(frames=12, esv_uL=6.0), "mechanics": Mechanics(active=active)})
     told = refusal(config)
     assert re.search(r"asks for a T_Ca of \d+ kPa, and muscle bears 200: give loop\.esv_uL", told)
     (remaining,) = re.search(r"esv_uL of ([\d.]+) times", told).groups()

@@ -97,7 +97,7 @@ def test_tangent_of_everything_together_is_the_derivative_of_the_forces(monkeypa
 
 @pytest.mark.slow
 def test_pericardium_is_at_rest_at_end_diastole_and_takes_up_work_after_it():
-    loop = Loop(frames=10)
+    loop = Loop(frames=6)
     pericardium = {"spring_kPa_per_mm": 5.0, "dashpot_kPa_s_per_mm": 0.01}
     free, held = (
         beat(Config(geometry=COARSE, loop=loop, mechanics=Mechanics(pericardium=p, hold="base")))["mechanics"]
@@ -116,7 +116,7 @@ def test_pericardium_is_at_rest_at_end_diastole_and_takes_up_work_after_it():
 def test_pressure_does_the_work_that_wall_and_surroundings_take_up():
     """Virtual work of every frame, by energies written down anew, with every means at once."""
     mechanics = Mechanics.model_validate(EVERYTHING | {"viscosity_Pa_s": 20.0})
-    solved = solved_heart(Config(geometry=COARSE, loop=Loop(frames=20), mechanics=mechanics))
+    solved = solved_heart(Config(geometry=COARSE, loop=Loop(frames=10), mechanics=mechanics))
     works = balance(solved)
     assert works.error < 1e-6
     share = np.abs(works.wall[:, 4]).max() / np.abs(works.blood).max()
@@ -134,7 +134,7 @@ def test_a_dashpot_alone_delays_and_a_slow_beat_does_not_feel_it():
             viscosity_Pa_s=0.0,
             active={"shortening_velocity_max_per_s": None},
         )
-        config = Config(geometry=COARSE, loop=Loop(frames=10, heart_rate_per_min=rate), mechanics=wall)
+        config = Config(geometry=COARSE, loop=Loop(frames=6, heart_rate_per_min=rate), mechanics=wall)
         return beat(config)["mechanics"]["active_tension"]
 
     free, fast, slow = tension(500.0, 0.0), tension(500.0, 0.05), tension(50.0, 0.05)
@@ -147,7 +147,7 @@ def base_motion(axial_spring, circumferential_spring):
     """Rotation of the inner less that of the outer rim of the base (rad), and the largest axial motion (m), at ES."""
     springs = {"axial_spring_kPa_per_mm": axial_spring, "circumferential_spring_kPa_per_mm": circumferential_spring}
     mechanics = Mechanics(base="elastic", elastic_base=springs, hold="base")
-    mesh, heart = left_ventricle(COARSE), beat(Config(geometry=COARSE, loop=Loop(frames=10), mechanics=mechanics))
+    mesh, heart = left_ventricle(COARSE), beat(Config(geometry=COARSE, loop=Loop(frames=6), mechanics=mechanics))
     displacement, es = heart["mechanics"]["displacement"], int(heart["mechanics"]["es_frame"])
     rims = (np.intersect1d(mesh.base, side) for side in (mesh.endo, mesh.epi))
     endo, epi = (slice_rotation((mesh.nodes + displacement[[0, es]])[:, rim, :2])[1] for rim in rims)

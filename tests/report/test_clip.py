@@ -26,13 +26,6 @@ def drawn(made, strain, height):
     return clip.render(made, strain, style.QUANTITIES["CC"], height)
 
 
-def test_thin_keeps_its_distance():
-    position = np.stack(np.meshgrid(np.arange(10.0), np.arange(10.0)), -1).reshape(-1, 2)
-    chosen = position[clip.thin(position, 3)]
-    apart = np.linalg.norm(chosen[:, None] - chosen, axis=-1) + 99 * np.eye(len(chosen))
-    assert apart.min() >= 3 and len(chosen) >= 9
-
-
 def test_frames_show_the_image_and_beside_it_the_motion_and_shortening_in_blue(made, strain):
     frames = drawn(made, strain, 240)
     assert frames.shape == (4, 240, 552, 3) and frames.dtype == np.uint8

@@ -30,15 +30,6 @@ def seen(path):
     return picture
 
 
-def test_without_pressures_there_are_words_in_place_of_the_loop(tmp_path):
-    nothing = np.full((2, 10), np.nan)
-    picture = np.asarray(
-        Image.open(style.save(loop.draw(TIME, 5, nothing[0], nothing, nothing), tmp_path / "loop.png"))
-    )
-    rows = np.flatnonzero((picture[..., :3] < 200).any(axis=(1, 2)))
-    assert len(rows) and np.ptp(rows) < 0.05 * len(picture), "one line of text, no axes"
-
-
 def cycle(pressure, intervals):
     """A heart that twists, shortens and moves its base as a raised cosine."""
     turns = {"rotation_base": -0.05 * WAVE, "rotation_apex": 0.1 * WAVE, "twist": 0.15 * WAVE}
@@ -70,14 +61,6 @@ def test_physiology(tmp_path):
     shades = coloured(drawn, style.SHADE)
     bare = seen(style.save(physiology.draw(cycle(500 + 13000 * WAVE, (np.nan,) * 3), published), tmp_path / "b.png"))
     assert shades > 10000 + coloured(bare, style.SHADE), "isovolumic phases are shaded where there are any"
-
-
-@pytest.mark.slow
-def test_physiology_of_a_prescribed_motion_has_words_in_place_of_pressure_and_volume(tmp_path):
-    nothing = style.save(physiology.draw(cycle(np.full(10, np.nan), (np.nan,) * 3), {}), tmp_path / "a.png")
-    curves = style.save(physiology.draw(cycle(500 + 13000 * WAVE, (np.nan,) * 3), {}), tmp_path / "b.png")
-    of_curve = [coloured(seen(path)[500:], style.SOLVED) for path in (nothing, curves)]
-    assert of_curve[1] > 500 + of_curve[0]
 
 
 @pytest.mark.slow
@@ -129,17 +112,10 @@ def test_border_in_a_view_is_the_section_of_the_wall_in_that_frame(half_sphere, 
         np.testing.assert_allclose([radii.min(), radii.max()], expected, atol=0.01)
 
 
-def test_views_show_the_part_that_holds_the_wall(tmp_path):
-    left, right, bottom, top = views._shown([np.array([[[1.5, 7.5], [3.4, 9.4]]])], 12.0)
-    assert left < 1.5 and right > 3.4 and top < 7.5 and bottom > 9.4
-    assert right - left < 6 and bottom - top < 6
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("hearts", [1, 5])
-def test_leaderboard(tmp_path, hearts):
+def test_leaderboard(tmp_path):
     random = np.random.default_rng(0)
-    keys = [(f"h{k}", view, size, name) for k in range(hearts) for view in ("mid", "apex") for size in (64, 32)
+    keys = [(f"h{k}", view, size, name) for k in range(5) for view in ("mid", "apex") for size in (64, 32)
               for name in ("one", "two", "failing")]  # fmt: skip
     table = pd.DataFrame(keys, columns=["case", "view", "size_px", "tracker"])
     for figure in ("nrmse_all_percent", "e_cc_rms_pp", "e_ll_rms_pp", "e_rr_rms_pp"):
@@ -163,18 +139,6 @@ def test_bullseye_without_data_is_hatched_throughout(tmp_path):
     axes = figure.subplots()
     bullseye.disc(axes, nothing, bullseye.TwoSlopeNorm(0, -1, 1))
     assert all(wedge.get_hatch() for wedge in axes.patches) and len(axes.texts) == 4, "the names of four walls alone"
-
-
-def test_numbers_of_a_bullseye_stay_within_their_segments():
-    figure = style.figure(9.6, 3.45)
-    axes = figure.subplots(1, 3)[0]
-    bullseye.disc(axes, np.full(17, -18.0), bullseye.TwoSlopeNorm(0, -20, 20))
-    figure.canvas.draw()
-    to_data = axes.transData.inverted()
-    for number, (wedge, text) in enumerate(zip(axes.patches, axes.texts, strict=False), 1):
-        box = text.get_window_extent().transformed(to_data)
-        corners = [(x, y) for x in (box.x0, box.x1) for y in (box.y0 + box.height / 4, box.y1 - box.height / 4)]
-        assert all(wedge.get_path().contains_point(corner) for corner in corners), f"segment {number}"
 
 
 @pytest.mark.parametrize("number, position", [(1, (0, 0.85)), (2, (-0.74, 0.43)), (10, (0, -0.6)), (16, (0.38, 0.1))])
@@ -205,18 +169,6 @@ def panel(tracked):
     return curves.Panel("GCS", "%", 1e3 * TIME, 15.0, -18 * WAVE, tracked)
 
 
-def test_panel_whose_trackers_have_no_values_says_so_and_others_do_not():
-    nothing = np.full(10, np.nan)
-
-    def words(tracked):
-        axes = Figure().subplots()
-        curves._panel(axes, panel(tracked), dict.fromkeys(tracked, style.INK))
-        return [text.get_text() for text in axes.texts]
-
-    assert words({"one": nothing, "two": nothing}) == [curves.NO_VALUES]
-    assert words({"one": nothing, "two": WAVE}) == words({}) == []
-
-
 def test_a_tracker_has_the_same_colour_whatever_its_rank():
     """The colour of its place in the configuration."""
 
@@ -228,11 +180,6 @@ def test_a_tracker_has_the_same_colour_whatever_its_rank():
 
     assert colours("first", "second") == colours("second", "first")
     assert colours("second")["second"] == style.series_colour(1)
-
-
-def test_axis_of_curves_shows_truth_and_best_tracker_and_is_not_ruled_by_the_worst():
-    low, high = curves._limits(panel({"best": -20 * WAVE, "worst": -400 * WAVE}))
-    assert -60 < low < -20 and 0 < high < 10
 
 
 def test_figure_without_a_suffix_is_also_an_svg_without_paper(tmp_path):

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from echotruth.report import style
-
 pytestmark = pytest.mark.slow
 
 
@@ -84,40 +82,3 @@ def test_nothing_is_wider_than_the_window(player):
     for width in (390, 1300):
         player.set_viewport_size({"width": width, "height": 900})
         assert player.evaluate("document.documentElement.scrollWidth") <= width
-
-
-def test_what_goes_on_beyond_the_window_has_a_shade_there_until_it_is_scrolled_to(player):
-    player.set_viewport_size({"width": 390, "height": 900})
-    table = player.locator("#trackers .scroll")
-
-    def edge():
-        """Darkest shade of grey above the headings at the right side."""
-        picture = Image.open(BytesIO(table.screenshot())).convert("L")
-        return int(np.asarray(picture)[:3, -12:].min())
-
-    assert table.evaluate("table => table.scrollWidth > table.clientWidth")
-    assert edge() < 230
-    table.evaluate("table => { table.scrollLeft = table.scrollWidth; }")
-    assert edge() > 250
-
-
-def test_tracked_paths_have_the_colour_of_the_curve_of_their_tracker(player, reported):
-    path = player.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--tracked')")
-    figure = (reported.folder / "figures/curves.svg").read_text(encoding="utf-8")
-    assert path.strip() in style.SERIES and path.strip() in figure
-    assert 'stroke="var(--tracked)"' in player.locator("#course").inner_html()
-
-
-def test_text_and_axes_stand_out_from_the_paper():
-    others = (style.INK, style.MUTED, style.TARGET, style.RADIAL, style.CIRCUMFERENTIAL, style.LONGITUDINAL)
-    colours = [*others, *(colour for colour, _ in style.SIZES[:2]), *style.SERIES[:4]]
-    ratios = [(luminance(style.PAPER) + 0.05) / (luminance(colour) + 0.05) for colour in colours]
-    assert ratios[0] > 10 and ratios[1] > 4.5  # WCAG 2.2, contrast of text
-    assert min(ratios) > 2.5
-
-
-def luminance(colour: str) -> float:
-    """Relative luminance of WCAG 2.2."""
-    channels = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255
-    linear = np.where(channels <= 0.04045, channels / 12.92, ((channels + 0.055) / 1.055) ** 2.4)
-    return float(linear @ [0.2126, 0.7152, 0.0722])

@@ -1,47 +1,14 @@
 """Style of figures."""
 
 import re
-from collections import Counter
 from pathlib import Path
 
 import pytest
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
-from matplotlib.lines import Line2D
 
 import echotruth
 from echotruth.report import palette, style
-
-TRACKERS = ("as_published", "corrected", "window_deformation", "affine_dic", "dis", "dis_fine", "bspline_dic")
-
-
-@pytest.mark.parametrize(
-    ("width", "number", "columns"), [(12.0, 7, 7), (6.5, 7, 4), (5.0, 7, 3), (5.0, 3, 3), (1.0, 3, 1)]
-)
-def test_legend_has_as_few_rows_as_fit_beside_each_other(width, number, columns):
-    @style.styled
-    def drawn():
-        figure = style.figure(width, 3.0)
-        figure.subplots()
-        return figure, style.legend_below(figure, [Line2D([], [], label=name) for name in TRACKERS[:number]])
-
-    figure, legend = drawn()
-    figure.canvas.draw()
-    assert [text.get_text() for text in legend.get_texts()] == list(TRACKERS[:number]) and len(figure.legends) == 1
-    assert legend._ncols == columns
-    if columns > 1:
-        assert legend.get_window_extent().x0 >= 0 and legend.get_window_extent().x1 <= figure.bbox.width
-
-
-def test_colours_of_quantities_are_their_own():
-    """Strain of a contour has the colour of that of the tissue; what is solved and true is in ink."""
-    of = {name: quantity.colour for name, quantity in style.QUANTITIES.items() if name not in ("GCS", "GLS")}
-    shared = {colour for colour, count in Counter(of.values()).items() if count > 1}
-    assert shared <= {style.INK}
-    assert not set(of.values()) & set(style.SERIES)
-    assert style.QUANTITIES["GCS"].colour == of["CC"] and style.QUANTITIES["GLS"].colour == of["LL"]
-    over_images = (style.MOTION, style.FLOW, style.BORDER, *style.SERIES)
-    assert len(set(over_images)) == len(over_images)
 
 
 def test_shortening_is_blue_and_zero_is_white():
@@ -68,8 +35,3 @@ def test_no_other_module_of_the_package_names_a_colour_of_a_quantity():
 def test_volume_has_the_unit_of_its_size(largest, unit, shown):
     quantity = style.volume(largest)
     assert quantity.unit == unit and quantity.factor * largest == pytest.approx(shown)
-
-
-def test_symbols_have_their_index_as_one():
-    assert style.QUANTITIES["CC"].tex == "$E_{CC}$" and style.QUANTITIES["GCS"].tex == "GCS"
-    assert style.QUANTITIES["CC"].plain == "Circumferential strain E_CC (%)"

@@ -1,9 +1,7 @@
 """Versions: what a result depends on has another one, what it does not depend on has not, and no code is forgotten."""
 
-import ast
 import subprocess
 import sys
-from collections.abc import Iterator
 from contextlib import chdir
 from importlib.metadata import version
 from pathlib import Path
@@ -21,29 +19,6 @@ from echotruth.repository.version import BEFORE, motion_hash, packages, version_
 ROOT = Path(__file__).parents[2]
 STAGES = list(BEFORE)
 OF_VIEW = [stage for stage in STAGES if stage != "inference"]
-
-
-def file_of(module: str) -> Path | None:
-    """File of a module of the package."""
-    path = PACKAGE.parent / Path(*module.split("."))
-    found = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
-    return found if module.startswith("echotruth") and found.is_file() else None
-
-
-def parsed(file: Path) -> Iterator[str]:
-    """Names that a file imports from the package, wherever in it, by Python's own parser."""
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
-        if isinstance(node, ast.ImportFrom):
-            assert not node.level, f"{file} imports by a relative name"
-            names = [str(node.module), *(f"{node.module}.{name}" for name in names)]
-        yield from (name for name in names if name.startswith("echotruth"))
-
-
-def test_imports_that_are_found_are_those_of_the_parser():
-    for file in [*PACKAGE.rglob("*.py"), *(ROOT / "workflow/scripts").glob("*.py")]:
-        found, names = {*imported(file)}, {*parsed(file)}
-        assert found <= names if "if TYPE_CHECKING:" in file.read_text() else found == names, file
 
 
 LOADED = "import {script}, sys; print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('echotruth')))"

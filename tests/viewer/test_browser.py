@@ -175,7 +175,7 @@ GEOMETRY = """() => {
 
 @pytest.mark.parametrize(
     ("width", "least", "query"),
-    [(390, 120, ""), (1280, 380, "&colour=strain&other=truth"), (1920, 440, "&colour=segment")],
+    [(390, 120, ""), (1280, 380, "&colour=strain&other=truth")],
 )
 def test_pictures_are_square_and_fill_the_window_with_the_graphs(opened, width, least, query):
     page = opened(f"?tracker=one&frame=0{query}", width)
@@ -183,9 +183,6 @@ def test_pictures_are_square_and_fill_the_window_with_the_graphs(opened, width, 
     found = page.evaluate(GEOMETRY)
     for across, along in found["sides"]:
         assert abs(across - along) <= 1 and across >= least
-    facts = f"Bokeh.index.find_one(({MODEL})('facts')).el.getBoundingClientRect()"
-    assert width < 1920 or page.evaluate(f"{facts}.bottom") <= 900
     assert found["wide"] == width and max(found["right"]) <= width
     assert width - found["graph"][1] < 20
-    assert width == 390 or "other" in query or found["graph"][0] > found["right"][0] - 1
     page.close()

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import time
 from dataclasses import replace
 from pathlib import Path
 from urllib.parse import parse_qs
@@ -64,15 +63,6 @@ def test_what_is_not_there_is_said_until_something_is_chosen(repository):
     assert not page.message.visible
 
 
-def test_bar_has_the_names_of_segments_and_ticks_of_a_quantity(page):
-    choose(page, colour="segment")
-    bar = page.panels[0].bar
-    assert "7 mid anterior" in bar.major_label_overrides.values()
-    assert list(bar.ticker.ticks) == list(bar.major_label_overrides)
-    choose(page, colour="strain")
-    assert not bar.major_label_overrides and 0 in bar.ticker.ticks
-
-
 def test_page_shows_the_images_of_what_is_chosen(page):
     assert page.clip.data["grey"][0].shape[-1] == SIZES[0] and not page.message.visible
     choose(page, size=str(SIZES[1]), view="long", colour="strain")
@@ -106,12 +96,6 @@ def test_paths_and_curve_of_a_tracker_have_one_colour(page):
         paths = [panel._renderers["tracked"][0].glyph.line_color for panel in page.panels]
         curves = [line.glyph.line_color for line in page.graphs["strain"]._lines[1:3]]
         assert paths == curves == [style.series_colour(trackers.index(name)) for name in (tracker, other)]
-
-
-def test_part_of_the_wall_follows_the_curve(page):
-    assert page.inputs["part"].value == "middle"
-    choose(page, curve="TT")
-    assert page.inputs["part"].value == "wall" and "layer 6" in page.inputs["part"].options
 
 
 def test_unfinished_case_is_said_so(unfinished):
@@ -165,19 +149,6 @@ def test_added_tracker_is_shown_where_it_was_evaluated_and_elsewhere_said_to_be_
     assert not page.panels[0].colour.data["index"][0].any() and not page.panels[0].positions["tracked"].data["x"].size
 
 
-@pytest.mark.slow
-def test_a_thousand_cases_open_in_half_a_second(tmp_path):
-    begin(tmp_path / "small", configured(seeds=range(1, 1_001)))
-    start = time.process_time()
-    repository = Repository(tmp_path / "small")
-    page = Page(repository, first(repository), "", Document())
-    page.show()
-    page.inputs["case"].value = repository.present[833]
-    page.show()
-    assert time.process_time() - start < 0.5
-    assert page.facts.text.startswith(repository.present[833]) and len(page.inputs["case"].completions) == 1_000
-
-
 def test_folder_without_a_repository_is_refused_and_one_that_was_renamed_is_shown(shown, tmp_path):
     with pytest.raises(FileNotFoundError, match="is not a repository"):
         opened(tmp_path)
@@ -201,10 +172,3 @@ def test_port_in_use_is_said_in_a_sentence(shown):
             serve(shown.folder, server.port)
     finally:
         server.stop()
-
-
-def test_times_of_the_frames_are_in_milliseconds(page):
-    time = page.times.data["time"]
-    assert time[0] == 0 and 10 < time[-1] < 1000
-    assert page.times.data["text"][1] == f"{time[1]:.1f} ms"
-    assert np.all(np.diff(time) > 0)

@@ -10,7 +10,7 @@ from echotruth.viewer import curves
 from echotruth.viewer.clip import Clip
 from echotruth.viewer.paths import paths
 from echotruth.viewer.points import Points
-from echotruth.viewer.tint import COLOURS, components, indices, nice, tint
+from echotruth.viewer.tint import COLOURS, components, tint
 
 
 @pytest.fixture
@@ -102,16 +102,6 @@ def test_every_colour_can_be_made(clip, points, colour):
         made = tint(clip, points, colour, component, "one")
         assert (made is None) == (colour == "none")
         assert made is None or made.index.shape == (FRAMES, SIZES[0], SIZES[0])
-
-
-def test_entries_of_a_palette_stand_for_their_values():
-    values = np.array([[-9.0, -1.0, 0.0, 0.5, 1.0, 9.0, np.nan]], np.float32)
-    np.testing.assert_array_equal(indices(values, -1, 1), [[1, 1, 128, 192, 255, 255, 0]])
-
-
-@pytest.mark.parametrize(("value", "above"), [(0.11, 0.15), (1.0, 1.0), (23.0, 25.0), (99.0, 100.0), (0.0, 1.0)])
-def test_scales_end_at_round_numbers(value, above):
-    assert nice(value) == pytest.approx(above)
 
 
 def test_paths_are_where_some_points_are(points):

@@ -1,7 +1,6 @@
 """`echotruth evaluate` adds anyone's tracker to a repository, whose motion is an affine map, and scores it."""
 
 import fcntl
-import json
 import shutil
 import sys
 from contextlib import nullcontext
@@ -30,7 +29,7 @@ COURSE = np.array([0, 0.4, 1, 0.3])
 """Share of the motion in each frame."""
 
 CONFIG = configured(
-    views=("mid", "apex"),
+    views=("mid",),
     loop=Loop(frames=len(COURSE)),
     bmode=Bmode(size_px=128, downsampling=(1, 2)),
     tracking=Tracking(
@@ -38,7 +37,6 @@ CONFIG = configured(
         trackers={
             "ours": PhaseCorrelation(window_px=32),
             "lot": External(track="custom:drawn"),
-            "poor": External(track="custom:small_only"),
         },
     ),
 )
@@ -165,13 +163,13 @@ def test_tracker_that_knows_the_motion_has_no_error_at_any_size(folder, evaluate
     table = scores(folder, "custom_exact")
     assert list(table["size_px"]) == [128, 64]
     assert (table["nrmse_percent"] < 1e-3).all() and (table["coverage_percent"] == 100).all()
-    assert et.Repository(folder).trackers == ["ours", "lot", "poor", "custom_exact"]
+    assert et.Repository(folder).trackers == ["ours", "lot", "custom_exact"]
 
 
 def test_every_complete_clip_is_tried_and_no_other_and_who_sees_no_motion_is_off_by_all_of_it(folder, evaluate):
-    shutil.rmtree(folder / f"small.zarr/clips/{SECOND}/apex/bmode/128")
+    shutil.rmtree(folder / f"small.zarr/clips/{SECOND}/mid/bmode/128")
     status, output, _ = evaluate(folder, "--tracker", "custom:still")
-    clips = [(*place, size) for place in ((FIRST, "mid"), (FIRST, "apex"), (SECOND, "mid")) for size in (128, 64)]
+    clips = [(FIRST, "mid", size) for size in (128, 64)]
     table = scores(folder, "custom_still")
     assert status == 0 and set(table[["case", "view", "size_px"]].itertuples(index=False, name=None)) == {*clips}
     np.testing.assert_allclose(table["nrmse_percent"], 100)
@@ -221,14 +219,14 @@ def test_tracker_of_the_configuration_leaves_the_bytes_that_it_leaves_by_the_com
 
 @pytest.mark.slow
 def test_later_evaluation_replaces_its_own_groups_and_touches_no_others(folder, evaluate):
-    for name, tracker in (("one", "custom:still"), ("two", "custom:still"), ("one", "custom:drawn")):
+    for tracker in ("custom:still", "custom:drawn"):
         before = content(folder)
-        assert evaluate(folder, "--tracker", tracker, "--name", name, *ONE)[0] == 0
+        assert evaluate(folder, "--tracker", tracker, "--name", "one", *ONE)[0] == 0
     after, own = content(folder), f"small.zarr/clips/{FIRST}/mid/tracking/one/"
     differ = {name for name in {*before, *after} if before.get(name) != after.get(name)}
     described = {"config.yaml", "SHA256SUMS", "small.zarr/zarr.json", f"small.zarr/clips/{FIRST}/mid/zarr.json"}
     assert described < differ and differ - described == {name for name in differ if name.startswith(own)} != set()
-    assert et.Repository(folder).trackers == ["ours", "lot", "poor", "one", "two"]
+    assert et.Repository(folder).trackers == ["ours", "lot", "one"]
     assert (scores(folder, "one")["nrmse_percent"] != 100).all() and not check(folder).faults
 
 
@@ -299,23 +297,11 @@ def test_tracker_that_crashes_under_the_name_of_one_that_was_added_leaves_that_o
     assert (content(added), (added / "trackers.yaml").read_bytes()) == before
 
 
-def misshapen(metadata):
-    """Zarr raises a TypeError of these shapes and names."""
-    return json.dumps(json.loads(metadata) | {"shape": ["x"], "dimension_names": [True]}).encode()
-
-
-def flipped(shard):
-    place = len(shard) // 3
-    return shard[:place] + bytes([shard[place] ^ 1]) + shard[place + 1 :]
-
-
-DAMAGED = {"zarr.json": misshapen, "c/0/0/0": flipped}
-
-
-@pytest.mark.parametrize("file", DAMAGED)
-def test_damaged_clip_is_refused_in_one_sentence(folder, evaluate, file):
-    path = folder / f"small.zarr/clips/{FIRST}/mid/bmode/128/image" / file
-    path.write_bytes(DAMAGED[file](path.read_bytes()))
+def test_damaged_clip_is_refused_in_one_sentence(folder, evaluate):
+    path = folder / f"small.zarr/clips/{FIRST}/mid/bmode/128/image/c/0/0/0"
+    shard = bytearray(path.read_bytes())
+    shard[len(shard) // 3] ^= 1
+    path.write_bytes(shard)
     status, _, errors = evaluate(folder, "--tracker", "custom:still", *ONE, in_processes=True)
     assert (status, errors.count("\n")) == (2, 1) and f"{path} is not what was written" in errors
     assert "trackers.yaml" not in {path.name for path in folder.iterdir()}
@@ -333,8 +319,6 @@ def test_scores_stand_under_a_name_made_of_that_of_the_tracker(tracker, name):
     [
         ("./my-tracker {input} {output}", "my_tracker"),
         ("python3 code/network.py {input} {output}", "network"),
-        ("julia -t 4 --project=. flow.jl {input} {output}", "flow"),
-        ("Rscript warp.R {input} {output}", "warp"),
         ("matlab -batch \"material_truth('{input}', '{output}')\"", "matlab"),
         ("track --config settings.yaml {input} {output}", "track"),
     ],
@@ -347,17 +331,8 @@ def test_scores_of_a_program_stand_under_the_name_of_its_script_or_its_own(comma
     "text, value",
     [("1e-3", 0.001), ("-1.5E3", -1500.0), ("[1e-3, 2]", [0.001, 2]), ("{b: 1e2}", {"b": 100.0}), ("e3", "e3")],
 )
-@pytest.mark.parametrize("tracker", ["a:b", "dis"])
-def test_option_that_looks_like_a_number_is_one(tracker, text, value):
-    settings = parse_tracker(tracker, None, [f"a={text}"])[1]
-    assert settings.get("options", settings)["a"] == value
-
-
-def test_external_tracker_of_the_configuration_that_fails_at_one_size_leaves_the_other_its_motion(folder, evaluate):
-    job = Job(folder, "tracking", FIRST, "mid", "poor")
-    large, small = solved(job)["tracking/poor"]["displacement"]
-    assert list(job.notes["failures"]) == ["128"] and "no room" in job.notes["failures"]["128"]
-    assert np.isnan(large).all() and np.nanmax(abs(small)) == 0
+def test_option_that_looks_like_a_number_is_one(text, value):
+    assert parse_tracker("a:b", None, [f"a={text}"])[1]["options"]["a"] == value
 
 
 REFUSED = {

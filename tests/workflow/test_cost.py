@@ -80,13 +80,6 @@ def test_page_on_clusters_has_time_and_memory_of_the_jobs():
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(3, "10 s"), (42, "40 s"), (70, "1 min"), (1000, "17 min"), (9000, "2.5 h")]
-)
-def test_time_in_words(seconds, text):
-    assert cost.duration(seconds) == text
-
-
-@pytest.mark.parametrize(
     ("given", "words", "is_absurd"),
     [
         ({"geometry": {"preset": "human"}, "rf": {"focus_mm": 40.0, "focal_zones": 1},

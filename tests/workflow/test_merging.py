@@ -35,11 +35,10 @@ def test_what_was_made_with_other_settings_is_made_anew(sources, tmp_path):
         and "bmode b mid" in done
         and not [job for job in done if "mechanics" in job or "truth" in job]
     )
-    assert content(tmp_path / "small") == content(finish(tmp_path / "once/small", other))
 
 
-def test_merge_that_was_killed_is_gone_on_with(sources, tmp_path, monkeypatch):
-    plan = plan_of(tmp_path / "small", BOTH)
+def test_merge_that_was_killed_is_gone_on_with_and_is_one_that_was_made_at_once(sources, tmp_path, monkeypatch):
+    plan, before = plan_of(tmp_path / "small", BOTH), content(sources[0])
 
     def fail(source, target):
         target.mkdir(parents=True)
@@ -51,6 +50,8 @@ def test_merge_that_was_killed_is_gone_on_with(sources, tmp_path, monkeypatch):
     monkeypatch.undo()
     assert merge(plan, sources) == 4
     assert remake(tmp_path / "small", BOTH) == ["repository"]
+    assert content(tmp_path / "small") == content(finish(tmp_path / "once/small", BOTH))
+    assert content(sources[0]) == before
 
 
 def test_heart_that_several_cases_share_is_copied_once(tmp_path):

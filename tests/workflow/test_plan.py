@@ -76,7 +76,7 @@ def test_what_was_made_otherwise_is_asked_for_and_nothing_is_touched(done, secti
 
 
 def test_what_the_configuration_has_no_more_is_no_part_of_the_repository_and_comes_back_without_a_job(tmp_path):
-    more = configured(bmode={"size_px": 64, "downsampling": (1, 2)}, cases={"fibres.endo_deg": [60.0, 70.0]})
+    more = configured(cases={"fibres.endo_deg": [60.0, 70.0]})
     one = {"views": {"mid": more.views["mid"]}, "tracking": more.tracking}
     fewer = more.model_copy(update=one | {"cases": Cases.model_validate({"fibres.endo_deg": [70.0]})})
     folder, before = finish(tmp_path / "small", more), content(tmp_path / "small")

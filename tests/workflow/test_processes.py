@@ -48,7 +48,7 @@ def test_processes_that_compile_forms_of_a_function_at_once_keep_them_all(tmp_pa
 
 
 @pytest.mark.parametrize("name", ["*.nbi", "*.nbc"])
-@pytest.mark.parametrize("kept", [0, 20, -1], ids=["emptied", "begun", "cut"])
+@pytest.mark.parametrize("kept", [0, -1], ids=["emptied", "cut"])
 def test_damaged_cache_is_no_cache(tmp_path, monkeypatch, name, kept):
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path / "cache"))
     (tmp_path / "double.py").write_text("import numba\n@numba.njit(cache=True)\ndef double(x):\n    return 2 * x\n")
@@ -157,10 +157,6 @@ def test_shell_of_a_job_knows_its_scripts_its_package_and_the_python_of_this_pro
     assert Path(scripts) == ROOT / "workflow/scripts" and Path(python).parent == Path(sys.executable).parent
     assert Path(folder) == user_cache() / cache_name()
     assert path.split(":")[0] == str(ROOT / "src")
-
-
-def test_shell_of_an_installed_package_leaves_the_path_of_python_alone(tmp_path):
-    assert "PYTHONPATH" not in prefix(tmp_path)
 
 
 @pytest.mark.parametrize("command", ["false; true", "false | true", 'echo "$no_such_variable"'])

@@ -5,9 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from echotruth.workflow import run
 from echotruth.workflow.progress import Progress
-from echotruth.workflow.run import ProgressLine
 
 PLAN = """\
 Job stats:
@@ -75,18 +73,3 @@ def test_failed_job_is_told_with_its_log_until_it_is_tried_again(told):
 class Terminal(io.StringIO):
     def isatty(self):
         return True
-
-
-@pytest.mark.parametrize(("stream", "shown"), [(Terminal(), 4), (io.StringIO(), 2)])
-def test_line_is_rewritten_on_a_terminal_and_comes_once_in_a_while_elsewhere(monkeypatch, stream, shown):
-    clock = SimpleNamespace(now=0.0)
-    monkeypatch.setattr(run.time, "monotonic", lambda: clock.now)
-    line = ProgressLine("demo", stream)
-    line.show("")
-    for number in range(4):
-        line.show(f"{number} of 4 jobs")
-        line.show(f"{number} of 4 jobs")
-        clock.now += 0.6 * run.LINE_SECONDS
-    line.close()
-    output = stream.getvalue()
-    assert output.count("demo: ") == shown and ("\n" in output) != stream.isatty()

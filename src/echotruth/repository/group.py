@@ -150,13 +150,16 @@ def read(store: Any, path: str, *names: str) -> Arrays:
     group = open_group(store, path)
     if isinstance(store, Path):  # first, since Zarr raises many kinds of what is damaged
         _verify(store, path, names or schema.arrays_of(group_of(path)))
-    present = set() if names else set(group.array_keys())
-    wanted = names or [name for name in schema.arrays_of(group_of(path)) if name in present]
-    for name in wanted:
-        if name not in group:
+    present: dict[str, Any] = {} if names else dict(group.arrays())
+    for name in names:
+        try:
+            present[name] = group[name]
+        except KeyError:
             why = group.attrs.get("reason")
-            raise NotWritten(f"{store}: {path} has no {name}: {why or 'run its configuration with this version'}")
-    return {name: part(group[name]) for name in wanted}  # type: ignore[arg-type]  # it is an array
+            lacking = f"{store}: {path} has no {name}: {why or 'run its configuration with this version'}"
+            raise NotWritten(lacking) from None
+    wanted = names or [name for name in schema.arrays_of(group_of(path)) if name in present]
+    return {name: part(present[name]) for name in wanted}
 
 
 def _verify(store: Path, path: str, names: Iterable[str]) -> None:

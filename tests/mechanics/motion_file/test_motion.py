@@ -16,10 +16,9 @@ from echotruth.mechanics.motion_file.wall import first_of_largest
 from echotruth.mechanics.physiology import measures
 from echotruth.mechanics.solver.cavity import cavity_volume
 
-FORMATS = [(name, order) for name in ("vtu", "npy") for order in (1, 2)]
-SLOW_FORMATS = [(name, 1) for name in ("vtk", "pvtu", "npz")]
-SLOW_FORMATS += [("pvd", order) for order in (1, 2)]
-"""Formats and orders of the tetrahedra: both orders of each way in which cells are read."""
+FORMATS = [("vtu", 1), ("npy", 2)]
+SLOW_FORMATS = [("vtk", 1), ("pvtu", 1), ("pvd", 2), ("npz", 1)]
+"""Formats and orders of the tetrahedra."""
 
 
 def check_affine(arrays, frames, rtol=1e-6):
@@ -84,8 +83,6 @@ def test_frames_of_the_files_are_not_interpolated_and_others_are_near_the_formul
     np.testing.assert_array_equal(twice["mechanics"]["displacement"][::2], as_recorded)
     # The error of a periodic cubic spline of sin^2 at 12 points, halfway: (pi / 12)^4 / 16 of the amplitude's 2/2.
     check_affine(twice, 2 * FRAMES, rtol=1e-3)
-    third = motion_from_file(configured(section, frames=FRAMES // 3))
-    np.testing.assert_array_equal(third["mechanics"]["displacement"], as_recorded[::3])
 
 
 @pytest.mark.slow

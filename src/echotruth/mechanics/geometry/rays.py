@@ -52,10 +52,13 @@ class Rays:
     def _distances_along(self, start: Floats, direction: Floats) -> Floats:
         ends: tuple[Any, Any] = start, start + 4 * direction  # arrays do, but the annotation asks for sequences
         self._locator.IntersectWithLine(*ends, EDGE_TOLERANCE, self._points, self._triangles)
-        hits = np.array([self._points.GetPoint(i) for i in range(self._points.GetNumberOfPoints())])
-        distances = np.sort((hits.reshape(-1, 3) - start) @ direction)
+        hits = [self._points.GetPoint(i) for i in range(self._points.GetNumberOfPoints())]
+        if not hits:
+            return np.empty(0)
+        distances, is_new = np.sort((np.array(hits) - start) @ direction), np.ones(len(hits), dtype=bool)
         # A ray through an edge meets both of its triangles.
-        return distances[np.diff(distances, prepend=-np.inf) > MERGE_DISTANCE] * self._size
+        is_new[1:] = distances[1:] - distances[:-1] > MERGE_DISTANCE
+        return distances[is_new] * self._size
 
     def distances(self, points: Floats) -> Floats:
         """Distances of points (n, 3), m, from the surface, shape (n,), m."""

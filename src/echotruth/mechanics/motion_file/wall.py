@@ -89,8 +89,7 @@ def moving_wall(config: Config) -> MovingWall:
     _check_size(wall, cycle, geometry)
     edges, cells = quadratic_cells(wall.cells, len(wall.nodes))
     _check_inverted(cycle, wall, edges, cells)
-    cycle = cycle.beginning_at(_end_diastole(config, wall, cycle, edges, cells))
-    wall, surface = _at_frame(wall, cycle, geometry)
+    cycle, wall, surface = _at_end_diastole(config, wall, cycle, edges, cells)
     frame = heart_frame(surface, septum_point(wall, geometry, surface))
     positions = with_midpoints((cycle.positions - frame.origin) @ frame.axes.T, edges)
     rest = labelled_mesh(positions[0], cells, surface)
@@ -162,15 +161,22 @@ def _at_frame(wall: ImportedMesh, cycle: RecordedCycle, geometry: Geometry) -> t
     return wall, label_boundary(wall, boundary(wall.cells)[0], geometry.surface_labels)
 
 
-def _end_diastole(config: Config, wall: ImportedMesh, cycle: RecordedCycle, edges: Integers, cells: Integers) -> int:
-    """Frame of the cycle that is named, or has the largest cavity."""
+def _at_end_diastole(
+    config: Config, wall: ImportedMesh, cycle: RecordedCycle, edges: Integers, cells: Integers
+) -> tuple[RecordedCycle, ImportedMesh, BoundarySurface]:
+    """The cycle from the frame on that is named, or has the largest cavity; the wall there, and its boundary."""
     named = config.motion.file.ed_frame
-    if named is not None:
+    if named is None:
+        first, surface = _at_frame(wall, cycle, config.geometry)
+        positions = with_midpoints(cycle.positions, edges)
+        frame = first_of_largest(_cavity_volumes(positions, labelled_mesh(positions[0], cells, surface), surface))
+        if frame == 0:
+            return cycle.beginning_at(0), first, surface
+    else:
         # The last frame is the first one again where it is left out.
-        return (named - cycle.first) % len(cycle.positions)
-    wall, surface = _at_frame(wall, cycle, config.geometry)
-    positions = with_midpoints(cycle.positions, edges)
-    return first_of_largest(_cavity_volumes(positions, labelled_mesh(positions[0], cells, surface), surface))
+        frame = (named - cycle.first) % len(cycle.positions)
+    cycle = cycle.beginning_at(frame)
+    return cycle, *_at_frame(wall, cycle, config.geometry)
 
 
 def first_of_largest(volume: Floats) -> int:
