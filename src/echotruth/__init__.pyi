@@ -12,6 +12,7 @@ from .evaluation.curves import strain_peaks
 from .heart import Heart
 from .imaging.beamforming.scanner import Scanner
 from .imaging.rf.full_matrix import FullMatrix
+from .imaging.rf.row_column import RowColumn
 from .inference.estimate import infer
 from .inference.observation import observe
 from .notebook.datasets import heart_dataset
@@ -21,6 +22,7 @@ from .notebook.sensitivities import sensitivities
 from .notebook.simulation import beat, image, systole
 from .notebook.tracking import evaluate, track
 from .notebook.velocity import velocity
+from .notebook.volume import voxel_truth
 from .repository.reader import Repository, sample
 from .sharing.fetching import fetch
 from .tracking.failure import TrackerFailed
@@ -36,6 +38,7 @@ __all__ = [
     "Probe",
     "Repository",
     "Rf",
+    "RowColumn",
     "Scanner",
     "TrackerFailed",
     "View",
@@ -61,4 +64,5 @@ __all__ = [
     "systole",
     "track",
     "velocity",
+    "voxel_truth",
 ]

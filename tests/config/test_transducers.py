@@ -61,7 +61,7 @@ def test_band_above_the_nyquist_frequency_is_refused(keys):
 
 def test_unknown_array_is_refused_with_those_there_are():
     with pytest.raises(
-        ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'mouse_linear_30MHz'"
+        ConfigError, match=r"probe\.preset = 'mouse': should be 'mouse_25MHz', .* or 'mouse_row_column_15MHz'"
     ):
         validate({"probe": {"preset": "mouse"}}, "a.yaml")
 

@@ -8,9 +8,10 @@ from benchmarks.exact_sum import exact_matrix
 from echotruth.config import Probe
 from echotruth.imaging.rf import spreading
 from echotruth.imaging.rf.directivity import ANGLES
-from echotruth.imaging.rf.full_matrix import PLANE, PLANE_ACCURACY, FullMatrix, _band, _damping
+from echotruth.imaging.rf.full_matrix import PLANE, PLANE_ACCURACY, FullMatrix
 from echotruth.imaging.rf.kernel import TAPS
 from echotruth.imaging.rf.probe import pulse_spectrum
+from echotruth.imaging.rf.record import damping_rate, pulse_grid
 
 PROBE = Probe(elements=12, attenuation_dB_per_cm_MHz=0.5)
 
@@ -48,8 +49,8 @@ def test_the_engine_spreads_to_the_same_traces_but_for_rounding(scene, traces):
 def test_transformed_and_divided_by_the_window_they_are_the_exact_sum(scene, traces):
     engine, position, amplitude = scene
     frequency = engine.frequency[::6]
-    loss = _damping(PROBE, frequency)
-    spectra = nonuniform_fft.transform(traces, frequency, loss, _band(PROBE, False).grid)
+    loss = damping_rate(PROBE, frequency)
+    spectra = nonuniform_fft.transform(traces, frequency, loss, pulse_grid(PROBE, False).grid)
     found = pulse_spectrum(PROBE, frequency)[:, None, None] * spectra
     exact = exact_matrix(PROBE, position, amplitude, frequency, elevation=False)
     assert np.linalg.norm(found - exact) < PLANE_ACCURACY * np.linalg.norm(exact)

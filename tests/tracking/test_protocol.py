@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from echotruth.config.tracking import METHODS, OUTSIDE, BsplineCnn, OpticalFlowIlk, PhaseCorrelation, name_of
+from echotruth.config.tracking import METHODS, OUTSIDE, BsplineCnn, PhaseCorrelation, name_of
 from echotruth.tracking import track
 
 SPACING = 3e-5
@@ -17,10 +17,8 @@ CORRECTED = {"window_px": 48, "taper": "hann", "reference": "previous"}
 """Options that phase correlation needs for motion that varies in space."""
 
 
-# bspline_cnn has learned of hearts, and needs the ring of a wall; optical_flow_ilk tracks volumes alone.
-@pytest.fixture(
-    params=[method for method in METHODS if method not in (*OUTSIDE, BsplineCnn, OpticalFlowIlk)], ids=name_of
-)
+# bspline_cnn has learned of hearts, and needs the ring of a wall.
+@pytest.fixture(params=[method for method in METHODS if method not in (*OUTSIDE, BsplineCnn)], ids=name_of)
 def tracker(request):
     return request.param(**CORRECTED if request.param is PhaseCorrelation else {})
 

@@ -3,12 +3,12 @@
 The bounds lie several times and more above the default heart, and are checked before anything is made.
 """
 
-from math import floor, isqrt
+from math import floor, isqrt, prod
 
 from echotruth.config.anatomy import Lengths, ellipsoid_mm3
 from echotruth.config.cases import Cases
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import Bmode, Phantom
+from echotruth.config.imaging import Bmode, Phantom, Volume
 from echotruth.config.probe import Probe
 from echotruth.config.realism import Realism
 from echotruth.config.table import MAX_CASES
@@ -37,6 +37,14 @@ def check_pixels(bmode: Bmode, frames: int) -> None:
     if frames * size**2 > MAX_CLIP_PIXELS:
         remedy = f"must be at most {isqrt(MAX_CLIP_PIXELS // frames)} with loop.frames = {frames}"
         raise invalid("bmode.size_px", size, remedy)
+
+
+def check_voxels(volume: Volume, frames: int) -> None:
+    """Check the number of voxels of a clip of volumes, whose envelopes are in memory together."""
+    if frames * prod(volume.size) > MAX_CLIP_PIXELS:
+        remedy = f"its product must be at most {MAX_CLIP_PIXELS // frames} with loop.frames = {frames}, "
+        remedy += f"as all volumes take {4 * frames * prod(volume.size) / 1e9:.3g} GB of memory"
+        raise invalid("volume.size", volume.size, remedy)
 
 
 def check_samples(probe: Probe, bmode: Bmode, lines: int, frames: int) -> None:

@@ -72,10 +72,12 @@ class ViewMotion(Section):
 class View(Section):
     """An imaging plane, and the probe in it."""
 
-    plane: Literal["short_axis", "long_axis"] = "short_axis"
-    """`short_axis`: perpendicular to the long axis. `long_axis`: contains it, seen from the apex."""
+    plane: Literal["short_axis", "long_axis", "volume"] = "short_axis"
+    """`short_axis`: perpendicular to the long axis. `long_axis`: contains it, seen from the apex. `volume`: the heart
+    in three dimensions, as the section `volume` says, by a row-column array of `probe.elements` columns and rows; its
+    middle plane is that of a short axis. It is imaged by `echotruth.image` (docs/volumes.md)."""
     position: Fraction = 0.5
-    """Short axis only: position of the plane at end-diastole, 0 at the base, 1 at the endocardial apex."""
+    """Short axis, volume: position of the plane at end-diastole, 0 at the base, 1 at the endocardial apex."""
     rotation_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 0.0
     """Long axis only: rotation of the plane about the long axis; 0 cuts septum and lateral wall."""
     tilt_deg: Annotated[FiniteFloat, Field(ge=-45, le=45)] = 0.0
@@ -145,7 +147,7 @@ class Rf(Section):
     `probe.preset`."""
     scan: Literal["sector", "linear"] = "sector"
     """`sector`: lines from the centre of the array at equal angles. `linear`: parallel lines perpendicular to the
-    array. Default: `linear` for `mouse_linear_30MHz`."""
+    array. Default: `linear` for `mouse_linear_30MHz` and `mouse_row_column_15MHz`."""
     lines: Annotated[int, Field(ge=16, le=2048)] = 192
     """Scan lines. With the default there are five per beam width, and interpolation between them loses less than 1 % of
     the envelope."""
@@ -175,12 +177,12 @@ class Rf(Section):
     the frequency stays, so give that too."""
     f_number: Annotated[FiniteFloat, Field(ge=0, le=20)] = 0.0
     """Smallest F-number, on receive and focused transmit; 0 uses the whole array at every range. Default: 2 for
-    `mouse_linear_30MHz`."""
+    `mouse_linear_30MHz`, 1 for `mouse_row_column_15MHz`."""
     elevation_beam: bool = True
-    """Include scatterers off the imaging plane, with the lens's elevation beam; `false` makes the elements infinitely
-    tall. The error of the RF against the exact sum (relative, L2) is 1.5 % beyond one aperture, or beyond two with the
-    tall lens of a human's array, and some per cent nearer or, with attenuation, far from the plane; without the lens it
-    is 2e-5 within 32 degrees (24 degrees for `mouse_30MHz` and `mouse_40MHz`)."""
+    """Include the lens's elevation beam; with `false`, elements are points in elevation, which send and hear as well to
+    all sides of the imaging plane. The error of the RF against the exact sum (relative, L2) is 1.5 % beyond one
+    aperture, or beyond two with the tall lens of a human's array, and some per cent nearer or, with attenuation, far
+    from the plane; without the lens it is 2e-5 within 32 degrees (24 degrees for `mouse_30MHz` and `mouse_40MHz`)."""
     keep: list[Literal["channels"]] = Field(default=[])
     """RF to keep beside the demodulated lines: `channels`, the echoes in every element of each element transmitting
     alone (full matrix), from which any transmit can be synthesised."""
@@ -237,6 +239,24 @@ class Dropout(Section):
     width: Annotated[FiniteFloat, Field(ge=0.02, le=1)] = 0.1
     """Distance over which the first loss changes, as a fraction of the scan and of the depth: standard deviation of its
     Gaussian correlation."""
+
+
+VoxelCount = Annotated[int, Field(ge=8, le=1024)]
+VoxelSide = Annotated[FiniteFloat, Field(gt=0, le=1000)]
+
+
+class Volume(Section):
+    """Voxels of views whose plane is `volume`: a box whose middle is at `rf.focus_mm` below the middle of the array."""
+
+    size: Annotated[tuple[VoxelCount, VoxelCount, VoxelCount], BeforeValidator(as_tuple)] = (144, 128, 96)
+    """Voxels in the axial direction, in elevation and in the lateral direction."""
+    field_mm: Annotated[tuple[VoxelSide, VoxelSide, VoxelSide], BeforeValidator(as_tuple)] = (6.3, 8.4, 6.3)
+    """Sides of the box in the same order. Default: the heart of a mouse, which is longest in elevation."""
+
+    @property
+    def voxel_mm(self) -> tuple[float, ...]:
+        """Sides of a voxel, in the order of `size`, mm."""
+        return tuple(side / count for side, count in zip(self.field_mm, self.size, strict=True))
 
 
 class Bmode(Section):

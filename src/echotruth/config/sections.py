@@ -10,7 +10,7 @@ from echotruth.config.cases import Cases
 from echotruth.config.defaults import apply_presets
 from echotruth.config.fibres import Fibres
 from echotruth.config.geometry import Geometry
-from echotruth.config.imaging import ALL_VIEWS, VIEWS, Bmode, Phantom, Rf, View, Views
+from echotruth.config.imaging import ALL_VIEWS, VIEWS, Bmode, Phantom, Rf, View, Views, Volume
 from echotruth.config.inference import Inference
 from echotruth.config.loop import Loop
 from echotruth.config.mechanics import Mechanics
@@ -27,6 +27,12 @@ _TRACKER_LENGTHS = ("window_mm", "windows_mm", "knots_mm")
 
 
 _RIGHT = "geometry.surface_labels.right_endo"
+_NOT_IN_VOLUMES = {
+    **{"rf.harmonic": False, "phantom.in_plane_only": False, "realism.ring_down.level_dB": None},
+    **{"realism.aberration.delay_ns": 0.0, "realism.shadow.side": "none"},
+    **{"bmode.dropout.loss_dB": 0.0, "bmode.dropout.edge_loss_dB": 0.0},
+}
+"""Keys that must have these values where a volume is imaged."""
 
 
 class Config(Section):
@@ -51,6 +57,7 @@ class Config(Section):
     rf: Rf = Rf()
     realism: Realism = Realism()
     bmode: Bmode = Bmode()
+    volume: Volume = Volume()
     tracking: Tracking = Tracking()
     inference: Inference = Inference()
     cases: Cases = Cases()
@@ -146,7 +153,7 @@ class Config(Section):
         if self.geometry.file:
             return 0.0
         radius = self.geometry.outer_radius_mm()
-        if view.plane == "short_axis":
+        if view.plane != "long_axis":
             return radius
         angle, half_length = np.deg2rad(view.angle_deg), self.geometry.half_length_mm()
         along, across = half_length * np.cos(angle), radius * abs(np.sin(angle))
@@ -246,6 +253,21 @@ class Config(Section):
         self.require(is_given or is_solved, "mechanics.material.stiffness_kPa", remedy)
         remedy = "needs geometry.given_state = unloaded, because there is no pressure to unload from"
         self.require(not end_diastolic or prescribed != "volume", "loop.prescribed", remedy)
+
+    @check
+    def _check_volumes(self) -> None:
+        if not any(view.plane == "volume" for view in self.views.values()):
+            return
+        amounts.check_voxels(self.volume, self.loop.frames)
+        (depth, *across), field = self.volume.field_mm, "volume.field_mm"
+        remedy = f"its first side must be smaller than {2 * self.rf.focus_mm:g}, so that the box lies before the array"
+        self.require(depth < 2 * self.rf.focus_mm, field, remedy)
+        length = self.probe.elements * self.probe.pitch_um / 1e3
+        remedy = f"its second and third side must not exceed {length:g}, the length of the array, which sees no farther"
+        self.require(max(across) <= length, field, remedy)
+        for key, off in _NOT_IN_VOLUMES.items():
+            remedy = f"must be {'null' if off is None else str(off).lower()}, as volumes are made without it"
+            self.require(value_of(self, key) == off, key, remedy)
 
     @check
     def _check_amounts(self) -> None:

@@ -138,18 +138,6 @@ class Dis(Section):
     reference: Reference = "bidirectional"
 
 
-class OpticalFlowIlk(Section):
-    """Iterative Lucas-Kanade flow of scikit-image, unmodified; of volumes alone."""
-
-    method: Literal["optical_flow_ilk"] = "optical_flow_ilk"
-    """Name of the method."""
-    radius: Annotated[int, Field(ge=1, le=50)] = 6
-    """Half the side of the window that moves as one, voxels."""
-    warps: Annotated[int, Field(ge=1, le=50)] = 4
-    """Number of times that the volume is warped."""
-    reference: Reference = "bidirectional"
-
-
 TRACKER_ARGUMENTS = ("frames", "points", "mask", "spacing", "frame_time", "seed")
 """Names of the arguments of every tracker, in order."""
 
@@ -283,12 +271,11 @@ METHODS: tuple[type[Section], ...] = (
     BsplineDic,
     BsplineCnn,
     Dis,
-    OpticalFlowIlk,
     *OUTSIDE,
 )
 """Sections of all methods of tracking."""
 
-VOLUMETRIC: tuple[type[Section], ...] = (BsplineDic, OpticalFlowIlk)
+VOLUMETRIC: tuple[type[Section], ...] = (BsplineDic, External)
 """Sections of methods that track volumes."""
 
 BUILTIN = tuple(method.model_fields["method"].default for method in METHODS if method not in OUTSIDE)

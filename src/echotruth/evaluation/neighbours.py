@@ -13,8 +13,8 @@ def nearest(position: np.ndarray, target: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    position : ndarray of shape (point, 2), m
-    target : ndarray of shape (target, 2), m
+    position : ndarray of shape (point, 2) or (point, 3), m
+    target : ndarray of shape (target, 2) or (target, 3), m
 
     Returns
     -------
@@ -29,8 +29,8 @@ def within(position: np.ndarray, target: np.ndarray, radius: float) -> tuple[np.
 
     Parameters
     ----------
-    position : ndarray of shape (point, 2), m
-    target : ndarray of shape (target, 2), m
+    position : ndarray of shape (point, 2) or (point, 3), m
+    target : ndarray of shape (target, 2) or (target, 3), m
     radius : float, m
 
     Returns
@@ -58,5 +58,4 @@ def _squared_distances(position: np.ndarray, target: np.ndarray) -> Iterator[np.
     """Squared distances of a block of targets from all points, (targets of the block, point), m^2, block by block."""
     step = max(1, _BLOCK // max(1, len(position)))
     for first in range(0, len(target), step):
-        lateral, axial = (target[first : first + step, None] - position).transpose(2, 0, 1)
-        yield lateral * lateral + axial * axial
+        yield sum(apart * apart for apart in (target[first : first + step, None] - position).transpose(2, 0, 1))

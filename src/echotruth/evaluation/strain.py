@@ -22,7 +22,7 @@ import numpy as np
 from echotruth.evaluation.local_fit import LocalFit
 from echotruth.evaluation.neighbours import nearest
 from echotruth.evaluation.statistics import ratio
-from echotruth.mechanics.kinematics import IMAGE_COMPONENTS, strain
+from echotruth.mechanics.kinematics import IMAGE_COMPONENTS, RCL_COMPONENTS, strain
 
 RADIUS = 0.0375
 """Radius over the side of the image: 0.45 mm for a mouse heart, imaged in 12 mm."""
@@ -39,10 +39,11 @@ class StrainOperator:
 
     Attributes
     ----------
-    position : ndarray of shape (point, 2)
-        Points at end-diastole: lateral, axial, m.
-    axes : ndarray of shape (point, 2, 2)
-        Unit vectors of the wall at end-diastole: (radial, tangential) by (lateral, axial).
+    position : ndarray of shape (point, 2) or (point, 3)
+        Points at end-diastole: lateral, axial, m, and in a volume elevation.
+    axes : ndarray of shape (point, 2, 2) or (point, 3, 3)
+        Unit vectors of the wall at end-diastole: radial and tangential, in a volume radial, circumferential and
+        longitudinal.
     radius : float
         Radius of the neighbourhood of a point, m.
     """
@@ -56,15 +57,18 @@ class StrainOperator:
 
         Parameters
         ----------
-        displacement : ndarray of shape (frame, point, 2)
-            Since end-diastole: lateral, axial, m; NaN where unknown.
+        displacement : ndarray of shape (frame, point, 2) or (frame, point, 3)
+            Since end-diastole, m; NaN where unknown.
 
         Returns
         -------
-        ndarray of shape (frame, point, 3)
-            Green-Lagrange: radial, tangential, shear; NaN where the displacement is unknown or cannot be fitted.
+        ndarray of shape (frame, point, 3) or (frame, point, 6)
+            Green-Lagrange: radial, tangential, shear, or RR, CC, LL, RC, RL, CL; NaN where the displacement is unknown
+            or cannot be fitted.
         """
-        return strain(np.eye(2) + self.gradient(np.asarray(displacement, float)), self.axes, IMAGE_COMPONENTS)
+        dims = self.position.shape[1]
+        components = IMAGE_COMPONENTS if dims == 2 else RCL_COMPONENTS
+        return strain(np.eye(dims) + self.gradient(np.asarray(displacement, float)), self.axes, components)
 
     def gradient(self, displacement: np.ndarray) -> np.ndarray:
         """Displacement gradient du_i/dx_j: (frame, point, i), m, to (frame, point, i, j)."""
@@ -72,7 +76,7 @@ class StrainOperator:
         return np.where(np.isfinite(displacement).all(-1)[..., None, None], gradient, np.nan)
 
     def at(self, target: np.ndarray) -> LocalFit:
-        """The fit of the displacement at other points of the wall, (target, 2), m."""
+        """The fit of the displacement at other points of the wall, (target, 2) or (target, 3), m."""
         normal = np.zeros(target.shape)
         if len(self.position):
             normal = self.axes[nearest(self.position, target), 0]

@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 
 from echotruth.config import Config, Probe
 from echotruth.imaging.beamforming.aperture import Aperture, harmonic
-from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner, validate_scatterers
+from echotruth.imaging.beamforming.volume import VolumeScanner
 from echotruth.imaging.medium.body import Echoes
 from echotruth.imaging.medium.medium import Medium
 from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.rf import ring_down
 from echotruth.imaging.rf.aberration import delays, phasors
+from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
+from echotruth.imaging.rf.row_column import RowColumn
 from echotruth.imaging.rf.shadow import Rib
 from echotruth.units import mm
 
@@ -33,7 +35,7 @@ class Acquisition:
     Parameters
     ----------
     config : Config
-    scanner : Scanner
+    scanner : Scanner or VolumeScanner
     medium : Medium
     random : Random
         Makes the generators of the reverberation and of the noise in each frame.
@@ -44,17 +46,18 @@ class Acquisition:
         Standard deviation of the noise in a bin of a pair (complex), in the unit of the matrix; 0 for none.
     """
 
-    def __init__(self, config: Config, scanner: Scanner, medium: Medium, random: Random):
+    def __init__(self, config: Config, scanner: Scanner | VolumeScanner, medium: Medium, random: Random):
         realism = config.realism
         self._scanner, self._medium, self._random = scanner, medium, random
-        self._haze_range, self._filter, self._matrix = 0.0, None, scanner.matrix
+        self._haze_range, self._filter = 0.0, None
+        self._matrix: FullMatrix | RowColumn = scanner.matrix
         self._growth_range = config.rf.focus_mm * mm if config.rf.harmonic else 0.0
         self._screen = _screen(config, scanner.matrix.frequency, random) if realism.aberration.delay_ns else ()
         if realism.haze.level_dB is not None:
             echoes = reverberation(realism.haze, config.probe, config.depth_mm * mm, random("haze"))
             self._haze_range = realism.haze.max_source_range_mm * mm
             self._filter = 1 + reverberation_filter(echoes, config.probe, scanner.matrix.frequency)
-        if realism.shadow.side != "none":
+        if realism.shadow.side != "none" and isinstance(scanner, Scanner):
             self._matrix = scanner.matrix.behind(Rib(realism.shadow))
         snr = realism.noise.snr_dB
         self.noise = 0.0 if snr is None else self._signal_to_unit_noise() * 10 ** (-snr / 20)
@@ -84,7 +87,7 @@ class Acquisition:
 
     def _grown(self, position: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
         """Amplitudes (n,) of scatterers (n, 3), m, times what there is of the harmonic, relative to the focus."""
-        if not self._growth_range:
+        if not self._growth_range or not isinstance(self._scanner, Scanner):
             return amplitude
         # Of a plane wave whose attenuation is proportional to frequency: its loss is that of a wave sent as harmonic.
         _, range_ = self._scanner.scan.to_scan_coordinates(position[:, 0], position[:, 1])
@@ -111,9 +114,9 @@ class Acquisition:
 
     @cached_property
     def _muscle(self) -> tuple[np.ndarray, np.ndarray]:
-        """Where muscle is in the lines at end-diastole, (lines, ranges), bool, and its echo there."""
+        """Where muscle is in lines or volume at end-diastole, bool, and its echo there, (n,)."""
         scanner = self._scanner
-        muscle = self._medium.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
+        muscle = self._medium.wall.contains(0, scanner.positions())
         if not muscle.any():
             remedy = "so levels relative to it (realism.noise, realism.ring_down) have no meaning"
             raise ValueError(f"There is no muscle in the image at end-diastole, {remedy}.")

@@ -334,12 +334,33 @@ def largest_clip(
 
     Parameters are those of :func:`envelope_images`, and whether the clip is a cycle that repeats.
     """
-    images = envelope_images(lines, scan, range_, bmode, gain)
+    has_filter = bmode.smoothing or bmode.edge_enhancement
+    inside = ScanConversion(scan, range_, bmode).inside if has_filter else np.ones(1, bool)
+    return grey_images(envelope_images(lines, scan, range_, bmode, gain), inside, bmode, is_closed)
+
+
+def grey_images(images: np.ndarray, inside: np.ndarray, bmode: Bmode, is_closed: bool = True) -> np.ndarray:
+    """Envelopes, compressed and filtered as a scanner does.
+
+    Parameters
+    ----------
+    images
+        Shape (frames, axial, lateral) or (frames, axial, elevation, lateral), float32.
+    inside
+        Pixels within the scan, bool, of the shape of one frame.
+    bmode
+        Its compression and filters.
+    is_closed
+        Whether the clip is a cycle that repeats.
+
+    Returns
+    -------
+    Same shape, uint8.
+    """
     levels = log_compress(images, bmode.dynamic_range_dB, bmode.gain_dB)
     if bmode.persistence:
         levels = persist(levels, bmode.persistence, is_closed)
     if bmode.smoothing or bmode.edge_enhancement:
-        inside = ScanConversion(scan, range_, bmode).inside
         levels = np.stack([_filtered(level, inside, bmode) for level in levels])
     return eight_bit(levels, bmode)
 

@@ -1,6 +1,7 @@
 """The truth in the image: motion of the tissue at every pixel, interpolated as that of the scatterers."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -50,15 +51,27 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
         Pixel centres.
     tissue : callable, optional
         As :class:`echotruth.imaging.medium.tissue_images.TissueImages`.
+    elevation : ndarray of shape (n_elevation,), m, optional
+        Of the voxels of a volume; arrays then have n_axial, n_elevation, n_lateral in place of n_axial, n_lateral.
+    frames : sequence of int, optional
+        Those of which the arrays are. Default: all.
     """
 
     def __init__(
-        self, heart: Heart, plane: Plane, axial: Floats, lateral: Floats, tissue: TissueImage | None = None
+        self,
+        heart: Heart,
+        plane: Plane,
+        axial: Floats,
+        lateral: Floats,
+        tissue: TissueImage | None = None,
+        elevation: Floats | None = None,
+        frames: Sequence[int] | None = None,
     ) -> None:
         self._tissue_image = tissue
-        self._heart, self._axes, self._shape = heart, plane.axes, (len(axial), len(lateral))
-        pixels, frames = _pixels(plane, axial, lateral), range(len(heart.displacement))
-        self._tissue = [_locate_in_wall(heart, frame, pixels) for frame in frames]
+        self._heart, self._frames = heart, range(len(heart.displacement)) if frames is None else frames
+        pixels = _pixels(plane, axial, lateral, elevation)
+        self._shape = pixels.shape[:-1]
+        self._tissue = [_locate_in_wall(heart, frame, pixels.reshape(-1, 3)) for frame in self._frames]
         self._fields: dict[str, tuple[int, Callable[[int, MaterialPoints], NDArray[np.generic]]]] = {
             "displacement": (0, lambda frame, points: displacement(heart, frame, points) @ plane.axes.T),
             "strain": (0, lambda frame, points: strain(heart, frame, points)),
@@ -84,24 +97,26 @@ class PixelTruth(Mapping[str, NDArray[np.generic]]):
             return self._tissues(self._tissue_image)
         before, values_at = self._fields[name]
         images: NDArray[np.generic] = np.empty(0)
-        for frame, (inside, points) in enumerate(self._tissue):
+        for number, (frame, (inside, points)) in enumerate(zip(self._frames, self._tissue, strict=True)):
             values = values_at(frame, points)
-            if not frame:
-                shape = (*values.shape[:before], self._shape[0] * self._shape[1], *values.shape[before + 1 :])
+            if not number:
+                shape = (*values.shape[:before], prod(self._shape), *values.shape[before + 1 :])
                 images = _empty((len(self._tissue), *shape), values.dtype)
-            images[frame][(slice(None),) * before + (inside,)] = values
+            images[number][(slice(None),) * before + (inside,)] = values
         at = 1 + before
         return images.reshape(*images.shape[:at], *self._shape, *images.shape[at + 1 :])
 
     def _tissues(self, image: TissueImage) -> NDArray[np.uint8]:
         """Tissue at every pixel, (frame, n_axial, n_lateral), with the wall where the other arrays have it."""
-        images = np.stack([image(frame) for frame in range(len(self._tissue))])
+        images = np.stack([image(frame) for frame in self._frames])
         for labels, (inside, _) in zip(images, self._tissue, strict=True):
             labels.reshape(-1)[inside] = TissueLabel.WALL
         return images
 
 
-def wall_mask(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> NDArray[np.bool_]:
+def wall_mask(
+    heart: Heart, plane: Plane, axial: Floats, lateral: Floats, elevation: Floats | None = None
+) -> NDArray[np.bool_]:
     """Whether points of the image are in the wall at end-diastole.
 
     Parameters
@@ -109,20 +124,24 @@ def wall_mask(heart: Heart, plane: Plane, axial: Floats, lateral: Floats) -> NDA
     heart : Heart
     plane : Plane
     axial, lateral : ndarray of shape (n_axial,), (n_lateral,), m
+    elevation : ndarray of shape (n_elevation,), m, optional
 
     Returns
     -------
-    ndarray of shape (n_axial, n_lateral), bool
+    ndarray of shape (n_axial, n_lateral), bool, or (n_axial, n_elevation, n_lateral)
     """
-    inside = _locate_in_wall(heart, 0, _pixels(plane, axial, lateral))[0]
-    mask = np.zeros(len(axial) * len(lateral), bool)
-    mask[inside] = True
-    return mask.reshape(len(axial), len(lateral))
+    pixels = _pixels(plane, axial, lateral, elevation)
+    mask = np.zeros(prod(pixels.shape[:-1]), bool)
+    mask[_locate_in_wall(heart, 0, pixels.reshape(-1, 3))[0]] = True
+    return mask.reshape(pixels.shape[:-1])
 
 
-def _pixels(plane: Plane, axial: Floats, lateral: Floats) -> Floats:
-    """Pixel centres in the heart frame, (n_axial n_lateral, 3), m."""
-    return plane.to_heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1).reshape(-1, 3))
+def _pixels(plane: Plane, axial: Floats, lateral: Floats, elevation: Floats | None = None) -> Floats:
+    """Pixel centres in the heart frame, (n_axial, n_lateral, 3), or (n_axial, n_elevation, n_lateral, 3), m."""
+    if elevation is None:
+        return plane.to_heart(np.stack(np.broadcast_arrays(lateral, axial[:, None], 0.0), axis=-1))
+    voxels = np.broadcast_arrays(lateral, axial[:, None, None], elevation[:, None])
+    return plane.to_heart(np.stack(voxels, axis=-1))
 
 
 def _locate_in_wall(heart: Heart, frame: int, positions: Floats) -> tuple[NDArray[np.int64], MaterialPoints]:

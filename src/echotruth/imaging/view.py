@@ -25,10 +25,13 @@ class Plane:
         Centre of the array.
     axes : ndarray of shape (3, 3)
         Rows: unit vectors lateral, axial and elevation.
+    is_volume : bool
+        Whether a volume is imaged, of which it is the middle.
     """
 
     origin: Floats
     axes: Floats
+    is_volume: bool = False
 
     def to_image(self, positions: Floats) -> Floats:
         """Transform positions in the heart frame to lateral, axial, elevation; (..., 3) to (..., 3), m."""
@@ -56,7 +59,7 @@ def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
     Plane
     """
     apex, tilt, offset = endo_ed[:, 2].min(), view.tilt_deg * deg, view.offset
-    if view.plane == "short_axis":
+    if view.plane != "long_axis":
         axes = tilted(SHORT_AXIS, tilt)
         centre = np.array([0, 0, view.position * apex])
     else:
@@ -66,7 +69,8 @@ def imaging_plane(view: View, rf: Rf, endo_ed: Floats) -> Plane:
         centre = apex / 2 * axes[1] + 0.0  # no -0.0
     axes = turned(axes, view.angle_deg * deg)
     depth = rf.focus_mm * mm - offset.axial_mm * mm
-    return Plane(centre + offset.lateral_mm * mm * axes[0] - depth * axes[1], axes)
+    origin = centre + offset.lateral_mm * mm * axes[0] - depth * axes[1]
+    return Plane(origin, axes, is_volume=view.plane == "volume")
 
 
 def tilted(axes: Floats, angle: float) -> Floats:

@@ -24,7 +24,7 @@ from echotruth.mechanics.kinematics import IMAGE_COMPONENTS, strain
 from echotruth.tracking.point_grid import grid_positions
 
 ROTATION = "rotation"
-Kind = Literal["short_axis", "long_axis"]
+Kind = Literal["short_axis", "long_axis", "volume"]
 
 
 def quantity(kind: str) -> str:

@@ -5,6 +5,7 @@ import xarray as xr
 
 from echotruth.config import Config
 from echotruth.heart import Heart
+from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import frame_times
 
@@ -28,17 +29,21 @@ def check_heart(heart: object) -> None:
         raise ValueError(f"The heart has {of}, of which only its arrays can be used: beat it without `frames`.")
 
 
-def check_clip(clip: object, name: str = "clip") -> None:
-    """Check that a clip, or what a tracker made of one, is a dataset.
+def check_clip(clip: object, name: str = "clip", volumes: bool = False) -> None:
+    """Check that a clip, or what a tracker made of one, is a dataset, of slices unless volumes will do.
 
     Raises
     ------
     TypeError
         If it is something else, such as the path of a repository.
+    ValueError
+        If it is of volumes, and they will not do.
     """
     if not isinstance(clip, xr.Dataset):
         clips, tracked = "a Repository has one, echotruth.image makes one", "echotruth.track makes one from a clip"
         raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {clips if name == 'clip' else tracked}.")
+    if not volumes and "elevation" in clip.coords:
+        raise ValueError(f"{name}: is of volumes: give one of a short or a long axis.")
 
 
 def check_whole(clip: xr.Dataset, config: Config) -> None:
@@ -60,9 +65,13 @@ def check_whole(clip: xr.Dataset, config: Config) -> None:
         With the coordinate that is not that of the image.
     """
     size = clip.sizes["axial"]
-    axial, lateral = pixel_centres(config.bmode, size if size in config.bmode.sizes else config.bmode.sizes[0])
-    frame, time = np.arange(config.loop.frames), frame_times(config.loop)
-    for name, values in {"frame": frame, "time": time, "axial": axial, "lateral": lateral}.items():
+    if "elevation" in clip.coords:
+        centres = dict(zip(("axial", "elevation", "lateral"), voxel_centres(config), strict=True))
+    else:
+        size = size if size in config.bmode.sizes else config.bmode.sizes[0]
+        centres = dict(zip(("axial", "lateral"), pixel_centres(config.bmode, size), strict=True))
+    whole = {"frame": np.arange(config.loop.frames), "time": frame_times(config.loop)} | centres
+    for name, values in whole.items():
         found = np.asarray(clip[name].values, float)
         if found.shape != values.shape or not np.allclose(found, values, rtol=1e-6, atol=1e-12):
             raise ValueError(f"The clip's {name} is not that of its image: give all frames and pixels, in their order.")

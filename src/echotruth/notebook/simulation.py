@@ -15,17 +15,20 @@ from echotruth.config import Config, Probe, View
 from echotruth.config.building import Source, configure
 from echotruth.config.diagnosis import bounds_of
 from echotruth.heart import Heart
+from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth, wall_mask
 from echotruth.imaging.view import before_probe
+from echotruth.imaging.volume_sequence import VolumeSequence
 from echotruth.loop.cycle import heart_cycle
 from echotruth.mechanics.beat import beat as mechanics_beat
 from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.notebook.arguments import check_heart
+from echotruth.notebook.volume import volume_dataset
 from echotruth.repository.choice import image_size
 from echotruth.repository.datasets import as_stored, clip_dataset, source_of
 from echotruth.seeds import generator
@@ -164,6 +167,12 @@ def image(
     size = image_size(config, size)
     case, (moving, plane) = Case("heart", {}, config), before_probe(heart, config, name)
     random, is_closed = partial(generator, case, name), config.views[name].motion.is_closed
+    if plane.is_volume:
+        with progress_line("image", progress):
+            volumes = VolumeSequence(config, moving, plane, random).images(is_closed)
+        axial, elevation, lateral = voxel_centres(config)
+        mask = wall_mask(moving, plane, axial, lateral, elevation)
+        return volume_dataset(case, name, volumes, mask, source_of(heart, plane))
     sequence = Sequence(config, moving, plane, random)
     with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range

@@ -40,7 +40,8 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     -------
     Dataset
         displacement (frame, axial, lateral, plane), m, since end-diastole, and quality (frame, axial, lateral) at the
-        points of the trackers' grid; NaN outside the wall.
+        points of the trackers' grid; NaN outside the wall. In volumes (frame, point, vector) and (frame, point), at
+        points of the wall whose positions are coordinates (docs/volumes.md).
 
     Raises
     ------
@@ -68,11 +69,17 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     >>> float(np.abs(et.track(clip, at_rest)["displacement"]).max())
     0.0
     """
-    check_clip(clip)
-    if missing := [name for name in ("image", "mask", "grid_mask") if name not in clip]:
+    check_clip(clip, volumes=True)
+    is_volume = "elevation" in clip.coords
+    is_volume = "elevation" in clip.coords
+    if missing := [name for name in ("image", "mask", *["grid_mask"] * (not is_volume)) if name not in clip]:
         raise ValueError(f"clip: has no {missing[0]}: load it with image and mask among its variables.")
     case = case_of(clip)
     check_whole(clip, case.config)
+    if is_volume:
+        from echotruth.notebook.volume import track_volume  # compiled; whoever tracks a slice needs none of it
+
+        return track_volume(clip, tracker_section(case.config, tracker, options)).assign_attrs(tracker=_name(tracker))
     inside, size = clip["grid_mask"].values, clip.sizes["axial"]
     points = grid_points(case.config, size)[inside]
     spacing = case.config.bmode.field_of_view_mm * mm / size
@@ -125,8 +132,12 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     >>> bool(scores["nrmse_percent"] < 100)  # it finds more than nothing
     True
     """
-    check_clip(tracked, "tracked")
+    check_clip(tracked, "tracked", volumes=True)
     check_heart(heart)
+    if "elevation" in tracked.coords:
+        from echotruth.notebook.volume import evaluate_volume  # compiled, as in track
+
+        return evaluate_volume(tracked, heart)
     if "displacement" not in tracked or set(tracked["displacement"].dims) != {"frame", "axial", "lateral", "plane"}:
         raise ValueError("tracked: has no displacement (frame, axial, lateral, plane): give what et.track returns.")
     case, attributes, (moving, plane) = case_of(tracked), tracked.attrs, imaged_heart(tracked, heart)

@@ -25,7 +25,7 @@ KEPT_STDERR = 4096
 """Size of the end of what a program says on stderr that is kept, bytes."""
 
 
-def run(command: list[str], entries: dict[str, Any], timeout: float, shape: tuple[int, int]) -> Any:
+def run(command: list[str], entries: dict[str, Any], timeout: float, shape: tuple[int, ...]) -> Any:
     """Run a program on a clip.
 
     Parameters
@@ -37,12 +37,12 @@ def run(command: list[str], entries: dict[str, Any], timeout: float, shape: tupl
     timeout : float
         Longest time that it may take, s.
     shape : tuple of int
-        Number of frames and of points.
+        Number of frames, of points, and of components of a displacement.
 
     Returns
     -------
     ndarray or tuple of two ndarray
-        Displacement, (frame, point, 2), and quality, (frame, point), if the program writes one, as in the output file.
+        Displacement, (frame, point, component), and quality, (frame, point), if the program writes one.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def _write(path: Path, entries: dict[str, Any]) -> None:
                 npy.write_array(file, np.asarray(value), allow_pickle=False)
 
 
-def _read(path: Path, shape: tuple[int, int]) -> Any:
+def _read(path: Path, shape: tuple[int, ...]) -> Any:
     if not path.is_file():
         raise TrackerFailed("wrote no {output}, an .npz file with displacement and, if known, quality")
     try:
@@ -138,8 +138,8 @@ def _read(path: Path, shape: tuple[int, int]) -> Any:
             names = archive.namelist()
             if "displacement.npy" not in names:
                 raise TrackerFailed("wrote an {output} without displacement")
-            displacement = _array(archive, "displacement", (*shape, 2))
-            return (displacement, _array(archive, "quality", shape)) if "quality.npy" in names else displacement
+            displacement = _array(archive, "displacement", shape)
+            return (displacement, _array(archive, "quality", shape[:2])) if "quality.npy" in names else displacement
     except TrackerFailed:
         raise
     except Exception as error:  # zipfile and NumPy raise many kinds of a file that is damaged

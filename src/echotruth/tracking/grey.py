@@ -133,38 +133,30 @@ def _nepers(decibels: float) -> float:
     return decibels * log(10) / 20
 
 
-def local_ncc(first: np.ndarray, second: np.ndarray, side: Any) -> np.ndarray:
-    """Zero-normalised cross-correlation of two images in a square, or a block of a volume, around every pixel.
+def local_ncc(first: np.ndarray, second: np.ndarray, side: int) -> np.ndarray:
+    """Zero-normalised cross-correlation of two images in a square around every pixel.
 
     Parameters
     ----------
-    first, second : ndarray of shape (axial, lateral) or (depth, elevation, lateral)
+    first, second : ndarray of shape (axial, lateral)
         Grey values from 0 to 1.
-    side : int or tuple of int
-        Side of the square, px, odd, or those of the block; images are mirrored at their borders.
+    side : int
+        Side of the square, px, odd; images are mirrored at their borders.
 
     Returns
     -------
-    ndarray of the same shape
+    ndarray of shape (axial, lateral)
         From -1 to 1; NaN where the square has no texture in either image, or contains a pixel without a value.
     """
-    known = np.isfinite(first) & np.isfinite(second)
-    a, b = (np.where(known, image, 0).astype(float) for image in (first, second))
-    images = (a, b, a * a, b * b, a * b, 1.0 - known)
-    a, b, aa, bb, ab, unknown = (_box_mean(image, side) for image in images)
-    variances = aa - a**2, bb - b**2
-    valid = (np.minimum(*variances) > MIN_STD**2) & (unknown < 0.5 / np.prod(np.broadcast_to(side, first.ndim)))
-    product = np.where(valid, variances[0] * variances[1], np.nan)
-    return np.clip((ab - a * b) / np.sqrt(product), -1, 1)
-
-
-def _box_mean(image: np.ndarray, side: Any) -> np.ndarray:
-    if image.ndim == 3:
-        from scipy import ndimage
-
-        return ndimage.uniform_filter(image, side, mode="reflect")
     import cv2
 
+    known = np.isfinite(first) & np.isfinite(second)
+    a, b = (np.where(known, image, 0).astype(float) for image in (first, second))
     # OpenCV takes running sums, whose rounding depends on where a thread begins.
     cv2.setNumThreads(1)
-    return cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT)
+    images = (a, b, a * a, b * b, a * b, 1.0 - known)
+    a, b, aa, bb, ab, unknown = (cv2.blur(image, (side, side), borderType=cv2.BORDER_REFLECT) for image in images)
+    variances = aa - a**2, bb - b**2
+    valid = (np.minimum(*variances) > MIN_STD**2) & (unknown < 0.5 / side**2)
+    product = np.where(valid, variances[0] * variances[1], np.nan)
+    return np.clip((ab - a * b) / np.sqrt(product), -1, 1)

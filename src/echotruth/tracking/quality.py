@@ -122,11 +122,10 @@ ERRORS = {
     "dis": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
     "dis_fine": ErrorModel(0.335, 0.675, 0.207, 0.229, 0.0663, 0.0, 0.0),
     "bspline_dic": ErrorModel(0.172, 0.559, 0.259, 0.284, 0.0321, 0.196, 0.0),
-    "optical_flow_ilk": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
     "bspline_cnn": ErrorModel(0.0798, 0.202, 0.15, 0.19, 0.0, 0.113, 0.903),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`.
-None is fitted on volumes: `bspline_dic` has there the one of images, and `optical_flow_ilk` that of `dis`."""
+That of `bspline_dic` is not fitted on volumes, where it is used too."""
 
 
 def error_model(settings: Any) -> ErrorModel:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from echotruth.config.tracking import OUTSIDE, VOLUMETRIC, BsplineCnn, OpticalFlowIlk, name_of
+from echotruth.config.tracking import OUTSIDE, VOLUMETRIC, BsplineCnn
 from echotruth.extras import explained
 from echotruth.section import Section
 from echotruth.tracking import trackers
@@ -81,10 +81,7 @@ def track(
 def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality of the points of a clip, by a method of ours or from outside."""
     if clip.is_volume and type(settings) not in VOLUMETRIC:
-        names = " or ".join(name_of(each) for each in VOLUMETRIC)
-        raise ValueError(f"{settings.method} tracks flat images: volumes need {names}")
-    if isinstance(settings, OpticalFlowIlk) and not clip.is_volume:
-        raise ValueError(f"{settings.method} tracks volumes: flat images need another tracker, as dis")
+        raise ValueError(f"{settings.method} tracks flat images: volumes need bspline_dic, or a function or program")
     if isinstance(settings, OUTSIDE):
         return trackers.function(settings.method)(clip, settings)
     with explained(f"the tracker {settings.method}"):

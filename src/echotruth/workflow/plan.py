@@ -73,6 +73,10 @@ class Plan:
 
     def __init__(self, values: dict[str, Any], source: str = "configuration", folder: Path | None = None) -> None:
         config = validate(dict(values), source)
+        for name, view in config.views.items():
+            if view.plane == "volume":
+                remedy = "a repository has slices: image volumes in Python by echotruth.image (docs/volumes.md)"
+                raise ConfigError(f"{source}: views.{name}.plane = volume: {remedy}")
         self.folder = folder or Path("out") / config.name
         self.config: Config = with_added_trackers(config, self.folder)
         # The files of a repository that stands were checked when it was made.

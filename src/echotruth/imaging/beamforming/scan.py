@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from echotruth.config import Probe, Rf
+from echotruth.config import Config, Probe, Rf
 from echotruth.units import deg, mm, um
 
 
@@ -81,3 +81,10 @@ def sample_positions(scan: Scan, range_: np.ndarray) -> tuple[np.ndarray, np.nda
     """Lateral and axial coordinates (lines, ranges), m, of the samples of all lines at ranges (ranges,), m."""
     lateral = scan.line_origin[:, None] + np.sin(scan.angle)[:, None] * range_
     return lateral, np.cos(scan.angle)[:, None] * range_
+
+
+def voxel_centres(config: Config) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Axial, elevation and lateral coordinates of the voxels of a volume, each of shape (n,), m."""
+    steps = zip(config.volume.size, config.volume.voxel_mm, strict=True)
+    axial, elevation, lateral = ((np.arange(count) - (count - 1) / 2) * (step * mm) for count, step in steps)
+    return axial + config.rf.focus_mm * mm, elevation, lateral

@@ -76,6 +76,11 @@ class Scanner:
         """Angles of the lines from the axial axis, shape (lines,), rad; the smallest lateral coordinate first."""
         return self.scan.angle
 
+    def positions(self) -> np.ndarray:
+        """Positions of the samples of all lines, (lines, ranges, 3), m."""
+        lateral, axial = sample_positions(self.scan, self.range)
+        return np.stack([lateral, axial, np.zeros_like(lateral)], axis=-1)
+
     def lines(self, position: np.ndarray, amplitude: np.ndarray, exponent: np.ndarray | float = 0.0) -> np.ndarray:
         """Lines of one frame.
 

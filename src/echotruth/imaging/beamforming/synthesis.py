@@ -17,6 +17,7 @@ from echotruth.imaging.beamforming.gate import Gate, Sampling
 from echotruth.imaging.beamforming.transmit import Transmits
 from echotruth.imaging.rf.full_matrix import FullMatrix
 from echotruth.imaging.rf.product import HEIGHT, ROW_PADDING, padded, product
+from echotruth.imaging.rf.record import Record
 from echotruth.threads import share
 
 BLOCK_TRANSMITS = 128
@@ -88,7 +89,7 @@ def synthesise(matrix, start, rotation, factor, bins, spectra, tiles):
                     spectra[transmit, element, bins[first + k]] = np.complex64(value * factor[first + k])
 
 
-def channel_sampling(matrix: FullMatrix) -> Sampling:
+def channel_sampling(matrix: Record) -> Sampling:
     """Sampling at which the echoes of a matrix can be interpolated."""
     band = matrix.first_bin + np.arange(len(matrix.frequency))
     samples = fft.next_fast_len(int(interpolation.OVERSAMPLING * len(band)) + 1)

@@ -35,7 +35,7 @@ from echotruth.imaging.medium.filling import emptied, volumes
 from echotruth.imaging.medium.random_process import ar1
 from echotruth.imaging.rf.probe import wavelength
 from echotruth.imaging.view import Plane
-from echotruth.units import mm, ms, per_mm3
+from echotruth.units import mm, ms, per_mm3, um
 
 NEIGHBOURS = 8
 """Epicardial nodes from which the motion of a scatterer is interpolated."""
@@ -135,13 +135,13 @@ class SurroundingsMotion:
 
 @dataclass(frozen=True, eq=False)
 class Surroundings(Body):
-    """Scatterers around the heart; they keep their distance from the imaging plane, whatever the heart does.
+    """Scatterers around the heart; in a slice they keep their distance from its plane, whatever the heart does.
 
     Attributes
     ----------
     position : ndarray of shape (n, 3), m
         At end-diastole, in the heart frame: in the scan from `start_mm` to the imaging depth, and in the beam in
-        elevation; those inside the heart are hidden until it moves away.
+        elevation, or before the array that images a volume; those inside the heart are hidden until it moves away.
     amplitude : ndarray of shape (n,)
     tissue : ndarray of shape (n,), uint8
         A :class:`echotruth.imaging.labels.TissueLabel`.
@@ -165,7 +165,8 @@ class Surroundings(Body):
         to 1.48 and 1.62 to 1.72. The wall has 1.82, and 1.91 is fully developed.
         """
         config, plane, random = scene.config, scene.plane, scene.random(cls.name)
-        position, density = _drawn_evenly(config, random)
+        draw = _drawn_in_box if plane.is_volume else _drawn_evenly
+        position, density = draw(config, random)
         in_heart = plane.to_heart(position)
         tissue, power = tissues(config, scene.heart, plane, in_heart)
         sign = np.where(random.random(len(position)) < 0.5, -1.0, 1.0)
@@ -175,15 +176,18 @@ class Surroundings(Body):
 
     def positions(self, frame: int) -> Floats:
         position = self.scene.plane.to_image(self._motion(frame))
-        position[:, 2] = self.scene.plane.to_image(self.position)[:, 2]
+        if not self.scene.plane.is_volume:
+            position[:, 2] = self.scene.plane.to_image(self.position)[:, 2]
         return position
 
     def present(self, frame: int, position: Floats) -> NDArray[np.bool_]:
         """Whether those at positions in the image (n, 3), m, are in the scan and not in the heart: (n,)."""
-        config = self.scene.config
-        scan, column = scan_lines(config.probe, config.rf), config.realism.neighbours.chambers_dB is not None
-        line, _ = scan.to_scan_coordinates(position[:, 0], position[:, 1])
-        present = (np.abs(2 * line / (len(scan.angle) - 1) - 1) < SHOWN) & (position[:, 1] > 0)
+        config, present = self.scene.config, position[:, 1] > 0
+        column = config.realism.neighbours.chambers_dB is not None
+        if not self.scene.plane.is_volume:
+            scan = scan_lines(config.probe, config.rf)
+            line, _ = scan.to_scan_coordinates(position[:, 0], position[:, 1])
+            present &= np.abs(2 * line / (len(scan.angle) - 1) - 1) < SHOWN
         in_heart = self.scene.plane.to_heart(position[present])
         present[present] = outside_heart(self.scene.heart, frame, in_heart, column=column)
         return present
@@ -257,6 +261,16 @@ def _drawn_evenly(config: Config, random: np.random.Generator) -> tuple[Floats, 
     else:
         lateral, axial = line * np.ptp(scan.line_origin), range_
     return np.column_stack([lateral, axial, elevation * thickness]), density
+
+
+def _drawn_in_box(config: Config, random: np.random.Generator) -> tuple[Floats, Floats]:
+    """Positions (n, 3), m, before an array that images a volume, and the density there, (n,), 1/m^3."""
+    half, start = config.probe.elements * (config.probe.pitch_um * um) / 2, config.realism.surroundings.start_mm * mm
+    end = max((config.rf.focus_mm + config.volume.field_mm[0] / 2) * mm, start)
+    density = config.realism.surroundings.density * (config.phantom.density_per_mm3 * per_mm3)
+    number = random.poisson(density * (2 * half) ** 2 * (end - start))
+    position = random.uniform([-half, start, -half], [half, end, half], (number, 3))
+    return position, np.full(number, density)
 
 
 def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tuple[NDArray[np.uint8], Floats]:

@@ -65,12 +65,11 @@ class Wall(Body):
             amplitude = amplitude * self._fibre_echo(frame, position)
         return echoes(self.scene.config.phantom, position, amplitude)
 
-    def contains(self, frame: int, lateral: Floats, axial: Floats) -> NDArray[np.bool_]:
-        """Whether points of the image lie in the wall in a frame; all arrays of one shape, coordinates in m."""
-        position = np.stack([lateral, axial, np.zeros_like(lateral)], axis=-1).reshape(-1, 3)
+    def contains(self, frame: int, position: Floats) -> NDArray[np.bool_]:
+        """Whether points before the probe (..., 3), m, lie in the wall in a frame: (...)."""
         heart = self.scene.heart
-        points = locate(heart.positions(frame), heart.cells, self.scene.plane.to_heart(position))
-        return (points.cell >= 0).reshape(lateral.shape)
+        points = locate(heart.positions(frame), heart.cells, self.scene.plane.to_heart(position.reshape(-1, 3)))
+        return (points.cell >= 0).reshape(position.shape[:-1])
 
     @cached_property
     def _fading(self) -> Callable[[int], Floats]:

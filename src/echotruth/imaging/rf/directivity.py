@@ -49,7 +49,9 @@ def spectral_exponent(square: Floats) -> Floats:
     return 2 * square * np.polyval(SINC_DERIVATIVE, square) / sinc(square)
 
 
-def pair_spectra(width: float, ratio: Floats, count: int) -> tuple[Floats, Floats]:
+def pair_spectra(
+    width: float, ratio: Floats, count: int, angles: int = ANGLES, half_aperture: float = HALF_APERTURE
+) -> tuple[Floats, Floats]:
     """Fit D_i(f) D_j(f) / (D_i(f0) D_j(f0)) of all pairs, for every angle from the centre of the array.
 
     With b_i and b_j less a mean, e = b_i + b_j and g = (b_i - b_j)^2, the fit is S_0 + S_1 e + S_2 e^2 + S_3 e^3 +
@@ -63,6 +65,10 @@ def pair_spectra(width: float, ratio: Floats, count: int) -> tuple[Floats, Float
         Frequencies over the centre frequency.
     count : int
         Terms, up to 6.
+    angles : int
+        Number of angles, evenly spaced in their sine from 0 on.
+    half_aperture : float
+        As :data:`HALF_APERTURE`.
 
     Returns
     -------
@@ -72,10 +78,10 @@ def pair_spectra(width: float, ratio: Floats, count: int) -> tuple[Floats, Float
         S_0, S_1 and so on.
     """
     scale = (np.pi * width) ** 2
-    mean_exponent, spectra = np.empty(ANGLES), np.empty((ANGLES, count, len(ratio)))
+    mean_exponent, spectra = np.empty(angles), np.empty((angles, count, len(ratio)))
     i, j = np.triu_indices(SAMPLED_ELEMENTS)
-    for angle, sine in enumerate(np.linspace(0, 1, ANGLES)):
-        sines = sine + HALF_APERTURE * np.cos(np.pi * (np.arange(SAMPLED_ELEMENTS) + 0.5) / SAMPLED_ELEMENTS)
+    for angle, sine in enumerate(np.linspace(0, 1, angles)):
+        sines = sine + half_aperture * np.cos(np.pi * (np.arange(SAMPLED_ELEMENTS) + 0.5) / SAMPLED_ELEMENTS)
         squares = np.minimum(scale * np.minimum(sines**2, 1), MAX_ARGUMENT_SQUARED)
         b = spectral_exponent(squares)
         mean_exponent[angle] = (b.min() + b.max()) / 2

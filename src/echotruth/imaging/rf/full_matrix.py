@@ -22,29 +22,28 @@ from __future__ import annotations
 from copy import copy
 from functools import lru_cache, partial, reduce
 
-import numba
 import numpy as np
-from scipy import fft
 
 from echotruth.config import Probe
 from echotruth.imaging.rf import directivity, kernel, spreading
-from echotruth.imaging.rf.attenuation import separable_damping
 from echotruth.imaging.rf.clusters import Cluster, Clusters, add_expanded
 from echotruth.imaging.rf.elevation import MAX_BLOCKS, Lens
-from echotruth.imaging.rf.frequency_sum import PAIRS, FrequencySum
-from echotruth.imaging.rf.kernel import NODES, TAPS, Band, Grid, stack_real_imaginary
+from echotruth.imaging.rf.frequency_sum import FrequencySum
+from echotruth.imaging.rf.kernel import NODES, TAPS, Band, stack_real_imaginary
 from echotruth.imaging.rf.lens_kernels import lens_kernels
-from echotruth.imaging.rf.probe import element_centres, pulse_band, pulse_spectrum, spectral_width
+from echotruth.imaging.rf.probe import element_centres
 from echotruth.imaging.rf.product import HEIGHT, padded
+from echotruth.imaging.rf.record import PLANE, Record, half_pulse, plane_tables, pulse_grid
 from echotruth.imaging.rf.shadow import Rib
+from echotruth.imaging.rf.spreading import phases_of
 from echotruth.threads import share
 from echotruth.units import MHz, dB_per_cm_MHz, um
 
 BLOCK = 256
 """Scatterers spread at a time."""
-PLANE, LENS, WIDE = 2, 1, 3
-"""Schemes of the kernels' tables (see :data:`.spreading.COEFFICIENTS`): without a lens; with it; with it for elements
-wider than `MAX_NARROW_WIDTH`."""
+LENS, WIDE = 1, 3
+"""Schemes of the kernels' tables (see :data:`.spreading.COEFFICIENTS`) with the lens, the latter for elements wider
+than `MAX_NARROW_WIDTH`; without it, the scheme is :data:`.PLANE`."""
 PLANE_ACCURACY = 2e-5
 """Relative error (L2) against the exact sum without the lens, within 32 degrees, or within 24 degrees if elements are
 0.88 wavelengths wide (`mouse_30MHz`, `mouse_40MHz`); times 1 + n / 2 for echoes with the exponent n."""
@@ -53,9 +52,6 @@ LENS_SPECTRA, PAIR_SPECTRA = (0, 0, 0, 0, 1, 1), (0, 1, 2, 2, 0, 1)
 indices, by the number of the term."""
 MAX_NARROW_WIDTH = 0.75
 """Width of an element, in wavelengths, up to which its directivity hardly changes with frequency."""
-MAX_BAND, SHARPNESS = (0.32, 0.41), (20.0, 15.0)
-"""Greatest frequency of the pulse over the sampling frequency of the grid, and sharpness of the window: without and
-with the lens."""
 EXPANDED = 1 << 28
 """Bytes of the spectra of clusters from which on they are expanded, so that memory does not grow with the clusters."""
 CLUSTER_TOLERANCE = (1e-6, 1e-3)
@@ -64,7 +60,7 @@ with the lens it is 3e-4 to 6e-4, and up to 1e-2 within 1.4 mm of a mouse's arra
 turns phases that the decomposition does not know; the few scatterers there are seldom in a cluster."""
 
 
-class FullMatrix:
+class FullMatrix(Record):
     """Echoes between all pairs of elements of a probe.
 
     Parameters
@@ -76,7 +72,7 @@ class FullMatrix:
     max_delay : float
         Greatest delay, early or late, that will be added to the echoes, s.
     elevation : bool
-        Whether the lens is there; without it, elements are infinitely tall; positions remain three-dimensional. The
+        Whether the lens is there; without it, elements are points in elevation, at a distance in three dimensions. The
         error against the exact sum is :data:`PLANE_ACCURACY` without the lens, and 1 % with it.
     harmonic : bool
         Whether echoes are those of the second harmonic of a wave that is sent at half of the frequency, which has the
@@ -84,14 +80,8 @@ class FullMatrix:
 
     Attributes
     ----------
-    frequency : ndarray of shape (bins,), Hz
-        Frequencies of the pulse band on the grid of the record.
-    first_bin : int
-        Bin of the first of them.
-    sampling : float, Hz
-        Sampling frequency of the record.
-    samples : int
-        Length of the record; it starts at time 0 and ends with the latest echo plus room for delays and pulse.
+    frequency, first_bin, sampling, samples
+        As of :class:`.Record`.
     centres : ndarray of shape (elements,), m
         Lateral coordinates of the elements.
     sound_speed : float, m/s
@@ -118,48 +108,23 @@ class FullMatrix:
         centre, speed = probe.frequency_MHz * MHz, probe.sound_speed_m_per_s
         self._width = probe.width_um * um * centre / speed
         self._scheme = (LENS if self._width <= MAX_NARROW_WIDTH else WIDE) if elevation else PLANE
-        band = _band(probe, elevation)
-        self.sampling = band.grid.sampling
-        half_pulse = 4.5 / (2 * np.pi * spectral_width(probe))
-        self.max_range = depth + speed * half_pulse / 2
-        last = 2 * self.max_range / speed + probe.elements * (probe.pitch_um * um) / speed + half_pulse
-        margin = 2 * spreading.LEAD + MAX_BLOCKS * TAPS
-        self.samples = _record_length(int((last + 2 * max_delay) * self.sampling) + margin)
-        if self.samples >= 1 << (31 - spreading.FRACTION_BITS):
-            remedy = "decrease the depth of the image or probe.sampling_MHz"
-            raise ValueError(f"A record of {self.samples} samples is too long: {remedy}.")
+        band = pulse_grid(probe, elevation)
+        self.max_range = depth + speed * half_pulse(probe) / 2
+        super().__init__(probe, band, 2 * self.max_range + probe.elements * (probe.pitch_um * um), max_delay)
         self.centres = element_centres(probe)
         self.sound_speed = speed
         loss = probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz * centre
         self._scales = self.sampling / speed, loss, centre / speed
         self._directivity = directivity.directivity_table(self._width)
-        self._set_filters(probe, band.grid)
         self._lens = _lens(probe, self.max_range, harmonic) if elevation else None
         if self._lens:
             self._sum = FrequencySum(probe, self.sampling, self.samples, harmonic)
         self._clusters = Clusters(self.centres, speed, band, self.max_range, CLUSTER_TOLERANCE[elevation])
         self._tabulate(band, band.frequency / centre)
 
-    def _set_filters(self, probe: Probe, grid: Grid) -> None:
-        """Set the filters that convert gridded traces to echoes: pairs of a function of time and a response."""
-        low, high = pulse_band(probe)
-        cycles = np.arange(self.samples // 2 + 1) / self.samples
-        inside = np.flatnonzero((cycles * self.sampling >= low) & (cycles * self.sampling <= high))
-        self.first_bin = int(inside[0])
-        self.frequency = cycles[inside] * self.sampling
-        rate = _damping(probe, self.frequency)
-        time = (np.arange(self.samples) - spreading.LEAD) / self.sampling
-        damping, filters = separable_damping(rate, time)
-        window = kernel.window_spectrum(grid.complex_frequency(self.frequency, rate), grid.sharpness)
-        response = pulse_spectrum(probe, self.frequency) / window
-        advance = np.exp(2j * np.pi * cycles[inside] * spreading.LEAD)  # rows begin LEAD samples before time 0
-        self._damping = damping.astype(np.float32)
-        self._responses = (filters * response * advance).astype(np.complex64)
-        self._ratio = self.frequency / (probe.frequency_MHz * MHz)
-
     def _tabulate(self, band: Band, ratio: np.ndarray) -> None:
         """Set the tables of kernels without the lens, or the lookup tables from which those with the lens are made."""
-        coefficients, phases = spreading.COEFFICIENTS[self._scheme], _phases(self._scheme)
+        coefficients, phases = spreading.COEFFICIENTS[self._scheme], phases_of(self._scheme)
         count = 6 if self._lens else 1 + max(term for term, number in enumerate(coefficients) if number)
         self._mean_exponent, pair_spectra = directivity.pair_spectra(self._width, ratio, count)
         if self._lens:
@@ -172,15 +137,7 @@ class FullMatrix:
                 maps,
             )
             return
-        spectra = stack_real_imaginary(pair_spectra + 0j)
-        terms = [
-            np.einsum("pdtf,kf->kpdt", kernel.fit_polynomials(band, 1, number - 1, phases)[0], spectra[:, term])
-            for term, number in enumerate(coefficients)
-            if number
-        ]
-        tables = np.concatenate(terms, axis=2).ravel()
-        self._tables = spreading.cache_aligned(len(tables))
-        self._tables[:] = tables
+        self._tables = plane_tables(band, self._scheme, pair_spectra)
 
     def behind(self, rib: Rib) -> FullMatrix:
         """The echoes that the array receives behind a rib: the same, each way times its transmission."""
@@ -217,7 +174,8 @@ class FullMatrix:
             if self._rib:
                 weight = propagation[1][: part.stop - start, : len(elements)]
                 weight *= self._rib.transmission(position[part], self.centres[elements])
-            added = (propagation, amplitude[part]), blocks, (tables, size), len(elements), lens, (0,) * self._scheme
+            pairs, scheme = (len(elements), len(elements), True), (0,) * self._scheme
+            added = (propagation, propagation, amplitude[part]), blocks, (tables, size), pairs, lens, scheme
             share(partial(spreading.spread, traces, *added), spreading.TRANSMIT_GROUPS)
         return traces
 
@@ -282,8 +240,7 @@ class FullMatrix:
         spread = self._lens.spreads(position) if self._lens else np.ones(len(position), bool)
         for power in np.unique(exponent[spread]):
             own = spread & (exponent == power)
-            responses = (self._responses * self._ratio**power).astype(np.complex64)
-            self._add_spectra(spectra, self._traces(cluster.skeleton, position[own], amplitude[own]), responses)
+            self.add_spectra(spectra, self._traces(cluster.skeleton, position[own], amplitude[own]), power)
         if spread.any() and cluster.delay.any():
             cluster.remove_delay(spectra, self.frequency)
         if not spread.all():
@@ -293,24 +250,13 @@ class FullMatrix:
             self._sum.add(spectra, self.first_bin, (centres, delay), (position, amplitude, exponent, passes))
         return spectra
 
-    def _add_spectra(self, spectra: np.ndarray, traces: np.ndarray, responses: np.ndarray) -> None:
-        """Add to spectra (bins, pairs) those of traces (pairs, samples), damped and filtered by the responses."""
-        band, threads = slice(self.first_bin, self.first_bin + len(self.frequency)), numba.get_num_threads()
-        for start in range(0, len(traces), PAIRS):
-            some = traces[start : start + PAIRS]
-            echoes = (
-                fft.rfft(some * fading, axis=1, workers=threads)[:, band] * response
-                for fading, response in zip(self._damping, responses, strict=True)
-            )
-            spectra[:, start : start + PAIRS] += reduce(np.add, echoes).T
-
 
 class _PlaneKernels:
     """Tables of echoes in the plane: one for each angle from the centre of the array, whatever the scatterer."""
 
     def __init__(self, full: FullMatrix, angle: np.ndarray, size: int) -> None:
         self._tables = full._tables
-        self._base = angle * size * _phases(full._scheme)
+        self._base = angle * size * phases_of(full._scheme)
 
     def __call__(self, part: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Lens terms, kernel blocks and tables of some of the scatterers, for :mod:`.spreading`."""
@@ -334,7 +280,7 @@ class _LensKernels:
         starts = np.searchsorted(self._owner, np.arange(0, len(position) + BLOCK, BLOCK))
         terms = zip(spreading.COEFFICIENTS[full._scheme], LENS_SPECTRA, PAIR_SPECTRA, strict=True)
         self._terms = np.array([(term, count, *spectra) for term, (count, *spectra) in enumerate(terms) if count])
-        rows = _phases(full._scheme), sum(spreading.COEFFICIENTS[full._scheme])
+        rows = phases_of(full._scheme), sum(spreading.COEFFICIENTS[full._scheme])
         self._tables = spreading.cache_aligned(int(np.diff(starts).max(initial=0)), *rows, TAPS)
         self._base = np.arange(len(self._tables)) * np.prod(rows) * TAPS
 
@@ -350,39 +296,10 @@ class _LensKernels:
         return self._lens_terms[part], blocks, tables.ravel()
 
 
-def _record_length(least: int) -> int:
-    """Smallest fast transform length of at least `least` samples that is not a multiple of 256.
-
-    Echoes are at similar samples of all traces; with a multiple of 256 these would compete for the same cache lines.
-    """
-    samples = fft.next_fast_len(least, real=True)
-    return samples if samples % 256 else _record_length(samples + 1)
-
-
-def _phases(scheme: int) -> int:
-    return 1 << spreading.PHASE_BITS[scheme]
-
-
-def _damping(probe: Probe, frequency: np.ndarray) -> np.ndarray:
-    """Rate alpha (f - f0) c at which an echo at these frequencies fades faster than at the centre frequency, 1/s."""
-    attenuation = probe.attenuation_dB_per_cm_MHz * dB_per_cm_MHz
-    return attenuation * (frequency - probe.frequency_MHz * MHz) * probe.sound_speed_m_per_s
-
-
 @lru_cache(maxsize=1)
 def _lens(probe: Probe, max_range: float, harmonic: bool) -> Lens:
     """Lens of a probe, kept for the next matrix of the same: its tables take most of the time to set one up."""
-    return Lens(probe, max_range, _band(probe, True), harmonic)
-
-
-def _band(probe: Probe, elevation: bool) -> Band:
-    """Band of the pulse, and the grid that samples it, with or without the lens."""
-    low, high = pulse_band(probe)
-    grid = Grid(max(probe.sampling_MHz * MHz, high / MAX_BAND[elevation]), SHARPNESS[elevation])
-    node, weight = np.polynomial.legendre.leggauss(NODES)
-    frequency = (low + high) / 2 + node * (high - low) / 2
-    energy = weight * pulse_spectrum(probe, frequency) ** 2
-    return Band(frequency, energy / energy.sum(), grid, _damping(probe, frequency))
+    return Lens(probe, max_range, pulse_grid(probe, True), harmonic)
 
 
 def _maps(band: Band, degree: int, phases: int) -> np.ndarray:

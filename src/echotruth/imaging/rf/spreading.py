@@ -207,23 +207,24 @@ def one_way(position, mean_exponent, lens_terms, array, propagation):
 
 
 @numba.njit(nogil=True, cache=True)
-def spread(traces, scatterers, kernel_blocks, tables, elements, lens, scheme, groups):
+def spread(traces, scatterers, kernel_blocks, tables, pairs, lens, scheme, groups):
     """Add the echoes of some scatterers to the traces of all pairs.
 
     Parameters
     ----------
     traces
-        Shape (pairs, samples), float32; added to. Sample LEAD is time 0. Pairs (i, j), i <= j, in the order of
-        `numpy.triu_indices`.
+        Shape (pairs, samples), float32; added to. Sample LEAD is time 0. Pairs (i, j) of transmitter and receiver, one
+        transmitter after the other.
     scatterers
-        Their propagation as :func:`one_way` writes it, each of shape (scatterers, elements or more, a multiple of
-        LANES), and their amplitude, shape (scatterers,), float32.
+        Their propagation to transmitters and to receivers as :func:`one_way` writes it, each of shape (scatterers,
+        elements or more, a multiple of LANES), and their amplitude, shape (scatterers,), float32.
     kernel_blocks
         Blocks of samples to add, shape (blocks, 3): scatterer, where its table begins, first sample from the echo.
     tables
         Tables of kernels, flat, float32, and the numbers in the rows of a phase.
-    elements
-        Number of elements.
+    pairs
+        Numbers of transmitters and of receivers, and whether these are the same elements, of which only the pairs
+        i <= j are there, in the order of `numpy.triu_indices`.
     lens
         Whether the inverse-range offsets are those of a lens; else the square of e is subtracted from their sum, which
         leaves (b_i - b_j)^2.
@@ -232,27 +233,34 @@ def spread(traces, scatterers, kernel_blocks, tables, elements, lens, scheme, gr
     groups
         First of the `TRANSMIT_GROUPS` groups of transmitters to be added, and the one after the last.
     """
-    propagation, amplitude = scatterers
-    time, weight, spectral_exponent, inverse_range_offset = propagation
+    sent, received, amplitude = scatterers
+    time, weight, spectral_exponent, inverse_range_offset = sent
+    transmitters, receivers, is_upper = pairs
     values, size = tables
-    samples, width = traces.shape[1], time.shape[1]
+    samples, width = traces.shape[1], received[0].shape[1]
     flat = traces.reshape(traces.size)
     planar = np.float32(lens == 0)
     for group in range(*groups):
-        pairs = np.empty((2, width), np.int32), np.empty((4, width), np.float32)
+        of_pairs = np.empty((2, width), np.int32), np.empty((4, width), np.float32)
         for block in range(len(kernel_blocks)):
             k, base, shift = kernel_blocks[block]
-            for start in range(0, elements, TRANSMIT_GROUPS):
+            for start in range(0, transmitters, TRANSMIT_GROUPS):
                 # Up in one round and down in the next: as many pairs for every thread.
                 even = start // TRANSMIT_GROUPS % 2 == 0
                 i = start + (np.int64(group) if even else TRANSMIT_GROUPS - 1 - np.int64(group))
-                if i >= elements:
+                if i >= transmitters:
                     continue
                 strength = weight[k, i] * amplitude[k]
                 transmitter = time[k, i], strength, spectral_exponent[k, i], inverse_range_offset[k, i], planar
-                table = np.int32(base), np.int32(size)
-                for j in range(i // LANES * LANES, elements, LANES):
-                    combine(propagation, k, j, transmitter, table, scheme, pairs)
-                row = (i * elements - i * (i + 1) // 2) * samples + LEAD + shift
-                for j in range(i, elements):
-                    spread_kernel(flat, row + j * samples, values, scheme, pairs, j)
+                table, first = (np.int32(base), np.int32(size)), i if is_upper else 0
+                for j in range(first // LANES * LANES, receivers, LANES):
+                    combine(received, k, j, transmitter, table, scheme, of_pairs)
+                before = i * receivers - (i * (i + 1) // 2 if is_upper else 0)
+                row = before * samples + LEAD + shift
+                for j in range(first, receivers):
+                    spread_kernel(flat, row + j * samples, values, scheme, of_pairs, j)
+
+
+def phases_of(scheme: int) -> int:
+    """Phases of a scheme, into which a sample is divided."""
+    return 1 << PHASE_BITS[scheme]

@@ -38,8 +38,9 @@ def track(clip: TrackerInput, settings: External) -> tuple[np.ndarray, np.ndarra
         If the tracker cannot be found, raises, exits, takes too long or returns an invalid result.
     """
     arrays = clip.frames.copy(), clip.points.copy(), clip.mask.copy()
-    arguments = (*arrays, float(clip.spacing), clip.frame_time.copy(), int(clip.seed))
-    command, shape = settings.command or [], (len(clip.frames), len(clip.points))
+    spacing = np.array(clip.spacing) if clip.is_volume else float(clip.spacing)
+    arguments = (*arrays, spacing, clip.frame_time.copy(), int(clip.seed))
+    command, shape = settings.command or [], (len(clip.frames), *clip.points.shape)
     try:
         if settings.track is not None:
             result = _call(settings.track, arguments, settings.options)
@@ -91,19 +92,19 @@ def load_callable(name: str) -> Callable[..., Any]:
         raise TrackerFailed(f"cannot be imported: {_describe(error)}") from error
 
 
-def _checked(result: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+def _checked(result: Any, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality as new arrays, from what the tracker returned."""
     if isinstance(result, tuple) and len(result) != 2:
         raise TrackerFailed(f"returned a tuple of {len(result)}, not displacement, or displacement and quality")
     displacement, quality = result if isinstance(result, tuple) else (result, None)
-    displacement = _real_array("displacement", displacement, (*shape, 2))
+    displacement = _real_array("displacement", displacement, shape)
     known = np.isfinite(displacement).all(-1)
     if not known[1:].any():
         raise TrackerFailed("returned no finite displacement after frame 0")
     largest = np.abs(displacement[known]).max()
     if largest > MAX_DISPLACEMENT_PX:
         raise TrackerFailed(f"returned a displacement of {largest:.3g} px: give px, {MAX_DISPLACEMENT_PX:g} at most")
-    initial = np.median(np.hypot(*displacement[0][known[0]].T)) if known[0].any() else 0.0
+    initial = np.median(np.linalg.norm(displacement[0][known[0]], axis=-1)) if known[0].any() else 0.0
     if initial > MAX_INITIAL_DISPLACEMENT_PX:
         raise TrackerFailed(
             f"returned a displacement of {initial:.1f} px in frame 0, where it is 0: return displacements since frame "
@@ -111,7 +112,7 @@ def _checked(result: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarra
         )
     if quality is None:
         return displacement, np.where(known, 1.0, np.nan)
-    quality = _real_array("quality", quality, shape)
+    quality = _real_array("quality", quality, shape[:2])
     if (np.abs(quality - 0.5) > 0.5 + QUALITY_TOLERANCE).any():
         low, high = np.nanmin(quality), np.nanmax(quality)
         raise TrackerFailed(f"returned a quality from {low:.3g} to {high:.3g}, not from 0 to 1")
