@@ -66,6 +66,7 @@ pictures: .venv/ready  ## of docs/gallery; half an hour; MICE is the folder of r
 	$(BIN)/python benchmarks/realism_picture.py $(MICE:%=--mice %)
 	$(BIN)/python benchmarks/moving_pictures.py $(MICE:%=--mice %)
 	$(BIN)/python benchmarks/doppler_pictures.py
+	$(BIN)/python benchmarks/volume_picture.py
 	$(BIN)/echotruth run config/demo.yaml
 	$(BIN)/python benchmarks/gallery_pictures.py out/demo
 	$(BIN)/echotruth run benchmarks/default.yaml

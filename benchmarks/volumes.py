@@ -24,7 +24,7 @@ from scipy.ndimage import zoom
 import echotruth as et
 from echotruth.config.tracking import BsplineDic
 from echotruth.evaluation.strain import StrainOperator
-from echotruth.evaluation.volume import WallPoints
+from echotruth.evaluation.volume import VolumePoints
 from echotruth.heart import Heart
 from echotruth.mechanics.fibres import unit
 from echotruth.repository.datasets import imaged_heart
@@ -88,7 +88,7 @@ def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> di
     points = np.column_stack([own[beside].values - first, own["axial"].values - axial[0]]) / step
     found = step * track(images, points, mask, step, clip["time"].values, 0, BsplineDic())[0][heart.es]
     position = np.column_stack([own[each].values for each in ("lateral", "axial", "elevation")])
-    wall, in_plane = WallPoints(*imaged_heart(clip, heart), position, RADIUS), [component, 1]
+    wall, in_plane = VolumePoints(*imaged_heart(clip, heart), position, RADIUS), [component, 1]
     true, whole = wall.displacement[heart.es], tracked["displacement"].values[heart.es]
     errors = {"slice": found - true[:, in_plane], "volume": own["displacement"].values[heart.es][:, in_plane]}
     errors["volume"] = errors["volume"] - true[:, in_plane]
@@ -96,7 +96,7 @@ def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> di
     size, number = np.linalg.norm(true[known][:, in_plane]), ("RR", "CC", "LL").index(along)
     axes = wall.operator.axes[:, [0, number]][:, :, in_plane]
     every = np.column_stack([tracked[each].values for each in ("lateral", "axial", "elevation")])
-    strain = WallPoints(*imaged_heart(clip, heart), every, RADIUS).operator.strain(whole[None])[0, :, number]
+    strain = VolumePoints(*imaged_heart(clip, heart), every, RADIUS).operator.strain(whole[None])[0, :, number]
     means = {
         "true": wall.strain(heart.es)[:, number].mean(),
         "slice": np.nanmean(StrainOperator(position[:, in_plane], unit(axes), RADIUS).strain(found[None])[0, :, 1]),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import echotruth as et
 from echotruth.config.loading import ConfigError
@@ -77,6 +78,7 @@ def test_realistic_volume_has_blood_and_surroundings_and_noise(heart):
         ({"volume.field_mm": [6.3, 9.0, 6.3]}, "volume.field_mm"),
         ({"volume.field_mm": [14.0, 6.6, 6.3]}, "before the array"),
         ({"volume.size": [1000, 1000, 1000]}, "GB of memory"),
+        ({"probe.elements": 16}, "mouse_row_column_15MHz"),
         ({"rf.harmonic": True}, "rf.harmonic"),
         ({"realism.ring_down.level_dB": 3.0}, "realism.ring_down.level_dB"),
     ],
@@ -91,7 +93,54 @@ def test_volume_is_refused_by_what_takes_slices(heart, clip):
         Plan(heart.config.model_dump(mode="json"))
     with pytest.raises(ValueError, match="is of volumes"):
         et.point_tracks(heart, clip, np.zeros((1, 2)))
-    with pytest.raises(ValueError, match="frame = 3: use 0 to 2"):
+    with pytest.raises(ValueError, match="frame = 3: use a whole number from 0 to 2"):
         et.voxel_truth(clip, heart, 3)
     with pytest.raises(ValueError, match="is no volume"):
         et.voxel_truth(clip.isel(elevation=0, drop=True), heart, 0)
+
+
+def test_tracker_that_knows_the_motion_has_no_error_and_one_that_sees_none_all_of_it(heart, clip):
+    def knowing(frames, points, mask, spacing, frame_time, seed):
+        lateral, axial, elevation = SHIFT
+        return np.multiply.outer([0, 0.5, 1], np.ones_like(points) * [lateral, elevation, axial] / spacing)
+
+    def still(frames, points, mask, spacing, frame_time, seed):
+        return np.zeros((len(frames), *points.shape))
+
+    with pytest.warns(UserWarning, match="reaches a face of the volume"):
+        tracked = et.track(clip, knowing)
+    scores = et.evaluate(tracked, heart)
+    assert scores["nrmse_cycle_percent"] < 1e-9 and abs(scores["segment_e_rr_bias_pp"]) < 1e-9
+    assert scores["coverage_percent"] == 100 and scores["drift_um"] < 1e-6 and abs(scores["twist_bias_deg"]) < 1e-6
+    swapped = tracked.isel(vector=[2, 0, 1])
+    assert et.evaluate(swapped.transpose(), heart)["nrmse_percent"] < 1e-9
+    with pytest.warns(UserWarning, match="reaches a face of the volume"):
+        assert et.evaluate(et.track(clip, still), heart)["nrmse_percent"] == pytest.approx(100)
+
+
+def test_what_is_no_track_of_the_wall_is_refused(heart, clip):
+    still = xr.Dataset(
+        {"displacement": (("frame", "point", "vector"), np.zeros((3, 1, 3)))},
+        {name: ("point", [0.0]) for name in ("lateral", "axial", "elevation")}
+        | {"frame": [0, 1, 2], "vector": ["lateral", "axial", "elevation"]},
+        clip.attrs,
+    )
+    with pytest.raises(ValueError, match="1 of its points are not in the wall"):
+        et.evaluate(still, heart)
+    with pytest.raises(ValueError, match="frames 0 to 2 of the heart, in their order"):
+        et.evaluate(still.isel(frame=[2, 1, 0]), heart)
+    with pytest.raises(ValueError, match="has no displacement"):
+        et.evaluate(still.isel(vector=0, drop=True), heart)
+
+
+def test_view_without_the_heart_is_refused_before_it_is_imaged(heart):
+    with pytest.raises(ValueError, match="There is no wall in the volume"):
+        et.image(heart, et.View(plane="volume", offset={"lateral_mm": 6.0}))
+    with pytest.raises(ValueError, match="are of slices"):
+        et.image(heart, "whole", size=128)
+
+
+def test_truth_of_a_part_is_part_of_the_truth(heart, clip):
+    part = {"lateral": slice(9, 3, -1), "axial": slice(2, 20)}
+    whole = et.voxel_truth(clip, heart, 1)
+    xr.testing.assert_equal(et.voxel_truth(clip.isel(part), heart, 1), whole.isel(part))

@@ -6,7 +6,6 @@ from scenes import medium, random, scene
 
 from echotruth.config import Config, Probe
 from echotruth.imaging.acquisition import Acquisition
-from echotruth.imaging.beamforming.scan import sample_positions
 from echotruth.imaging.beamforming.scanner import Scanner
 from echotruth.imaging.rf import ring_down
 from echotruth.imaging.rf.haze import reverberation, reverberation_filter
@@ -78,7 +77,7 @@ def test_every_tissue_has_the_exponent_of_its_own_key(twisting_heart, scanner):
 @pytest.mark.parametrize("snr", [10.0, 30.0])
 def test_the_lines_have_the_ratio_of_signal_to_noise_asked_for(acquire, scanner, snr):
     acquisition, whole = acquire(noise={"snr_dB": snr})
-    muscle = whole.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
+    muscle = whole.wall.contains(0, scanner.positions())
     echo = scanner.lines(*whole.wall(0))
     noise = scanner.beamform(np.float32(acquisition.noise) * acquisition.unit_noise(1))
     ratio = np.linalg.norm(echo[muscle]) / np.linalg.norm(noise[muscle])
@@ -187,7 +186,7 @@ def test_ring_down_has_the_level_asked_for_and_is_the_same_in_all_frames(acquire
     acquisition, whole = acquire(ring_down={"level_dB": 6.0})
     bare, _ = acquire()
     bands = [scanner.beamform(acquisition(frame) - bare(frame)) for frame in (0, 1)]
-    muscle = whole.wall.contains(0, *sample_positions(scanner.scan, scanner.range))
+    muscle = whole.wall.contains(0, scanner.positions())
     rms = np.sqrt(np.mean(np.abs(scanner.lines(*whole.wall(0))[muscle]) ** 2))
     assert 20 * np.log10(np.abs(bands[0]).max() / rms) == pytest.approx(6.0, abs=0.01)
     assert np.abs(bands[1] - bands[0]).max() < 1e-4 * np.abs(bands[0]).max()

@@ -126,9 +126,7 @@ def test_same_bytes_on_one_thread_and_on_two(shifts):
 
 @pytest.mark.parametrize("method", [Dis, PhaseCorrelation, BsplineCnn], ids=name_of)
 def test_flat_tracker_refuses_volumes_in_one_sentence(shifts, method):
-    with pytest.raises(
-        TrackerFailed, match=r"^\w+ tracks flat images: volumes need bspline_dic, or a function or program$"
-    ):
+    with pytest.raises(TrackerFailed, match=r"^\w+ tracks slices: volumes need bspline_dic, or a function or program$"):
         found(shifts, method())
 
 

@@ -31,6 +31,7 @@ _NOT_IN_VOLUMES = {
     **{"rf.harmonic": False, "phantom.in_plane_only": False, "realism.ring_down.level_dB": None},
     **{"realism.aberration.delay_ns": 0.0, "realism.shadow.side": "none"},
     **{"bmode.dropout.loss_dB": 0.0, "bmode.dropout.edge_loss_dB": 0.0},
+    **{"rf.keep": [], "tracking.frame_step": 1},
 }
 """Keys that must have these values where a volume is imaged."""
 
@@ -263,7 +264,8 @@ class Config(Section):
         remedy = f"its first side must be smaller than {2 * self.rf.focus_mm:g}, so that the box lies before the array"
         self.require(depth < 2 * self.rf.focus_mm, field, remedy)
         length = self.probe.elements * self.probe.pitch_um / 1e3
-        remedy = f"its second and third side must not exceed {length:g}, the length of the array, which sees no farther"
+        remedy = f"its second and third side must not exceed {length:g}, the length of the array: "
+        remedy += "one for volumes is probe.preset = mouse_row_column_15MHz"
         self.require(max(across) <= length, field, remedy)
         for key, off in _NOT_IN_VOLUMES.items():
             remedy = f"must be {'null' if off is None else str(off).lower()}, as volumes are made without it"

@@ -35,7 +35,7 @@ FEWEST = 8
 
 
 @dataclass(frozen=True)
-class WallPoints:
+class VolumePoints:
     """Points of the wall at end-diastole, and their true motion.
 
     Attributes
@@ -58,6 +58,11 @@ class WallPoints:
     @cached_property
     def _material(self) -> MaterialPoints:
         return locate(self.heart.positions(0), self.heart.cells, self.plane.to_heart(self.position))
+
+    @property
+    def is_in_wall(self) -> NDArray[np.bool_]:
+        """Whether each point is in the wall at end-diastole, (point,)."""
+        return self._material.cell >= 0
 
     @cached_property
     def displacement(self) -> Floats:
@@ -96,14 +101,14 @@ class WallPoints:
         return start + moved[:, known][:, nearest]
 
 
-def metrics(displacement: Floats, points: WallPoints, es: int) -> dict[str, float]:
+def metrics(displacement: Floats, points: VolumePoints, es: int) -> dict[str, float]:
     """Metrics of a tracked motion.
 
     Parameters
     ----------
     displacement : ndarray of shape (frame, point, 3), m
         Since end-diastole: lateral, axial, elevation; NaN where unknown.
-    points : WallPoints
+    points : VolumePoints
     es : int
         Frame of end-systole.
 
@@ -113,8 +118,8 @@ def metrics(displacement: Floats, points: WallPoints, es: int) -> dict[str, floa
         Name of a metric, which ends in its unit, to its value, at ES but for drift and that of the cycle:
         `nrmse_percent`, of the components in the middle plane and of that through it apart, and
         `nrmse_all_percent`, for which unknown points count as at rest; bias and RMS error of the strain of AHA
-        segments, all six components, against the strain of the elements; bias of GLS, of the mean circumferential
-        strain, of twist and of ejection fraction.
+        segments, all six components, against the strain of the elements; bias of GLS, of twist and of ejection
+        fraction.
     """
     true: Floats = points.displacement
     known = np.asarray(np.isfinite(displacement).all(axis=-1))
@@ -142,12 +147,12 @@ def _rms(vectors: Floats) -> float:
     return float(np.sqrt((vectors**2).sum(axis=-1).mean())) if vectors.size else np.nan
 
 
-def segment_strain(displacement: Floats, points: WallPoints) -> Floats:
+def segment_strain(displacement: Floats, points: VolumePoints) -> Floats:
     """Means over AHA segments 1 to 17, (17, 6), of the operator's strain of a displacement (point, 3), m."""
     return _segment_means(points.operator.strain(displacement[None])[0], points)
 
 
-def _segment_means(strains: Floats, points: WallPoints) -> Floats:
+def _segment_means(strains: Floats, points: VolumePoints) -> Floats:
     means = np.full((17, strains.shape[1]), np.nan)
     for number in range(17):
         own = strains[points.segment == number + 1]
@@ -157,7 +162,7 @@ def _segment_means(strains: Floats, points: WallPoints) -> Floats:
     return means
 
 
-def _strain_metrics(displacement: Floats, points: WallPoints, es: int) -> dict[str, float]:
+def _strain_metrics(displacement: Floats, points: VolumePoints, es: int) -> dict[str, float]:
     """Bias and RMS error of the strain of segments, percentage points."""
     error = 100 * (segment_strain(displacement, points) - _segment_means(points.strain(es), points))
     error = error[np.isfinite(error).all(axis=1)]
@@ -169,16 +174,17 @@ def _strain_metrics(displacement: Floats, points: WallPoints, es: int) -> dict[s
     return values
 
 
-def _global_metrics(displacement: Floats, points: WallPoints, es: int) -> dict[str, float]:
+def _global_metrics(displacement: Floats, points: VolumePoints, es: int) -> dict[str, float]:
     """Errors of the global measures at ES."""
     heart = points.heart
     tracked, true = points.nodes(displacement[[0, es]]), np.stack([heart.positions(0), heart.positions(es)])
-    found = _global(tracked, points) - _global(true, points)
+    known = np.isfinite(tracked).all()
+    found = _global(tracked, points) - _global(true, points) if known else np.full(3, np.nan)
     names = ("gls_bias_pp", "twist_bias_deg", "ef_bias_pp")
     return dict(zip(names, map(float, found), strict=True))
 
 
-def _global(nodes: Floats, points: WallPoints) -> Floats:
+def _global(nodes: Floats, points: VolumePoints) -> Floats:
     """GLS, %, twist, degrees, and ejection fraction, %, from nodes at ED and ES, (2, node, 3), m."""
     heart = points.heart
     gls = global_longitudinal_strain(heart.wall_depth, heart.cells, *nodes)

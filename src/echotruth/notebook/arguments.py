@@ -29,6 +29,11 @@ def check_heart(heart: object) -> None:
         raise ValueError(f"The heart has {of}, of which only its arrays can be used: beat it without `frames`.")
 
 
+def is_volume(clip: xr.Dataset) -> bool:
+    """Whether a clip, or what was tracked in one, is of volumes."""
+    return "elevation" in clip.coords
+
+
 def check_clip(clip: object, name: str = "clip", volumes: bool = False) -> None:
     """Check that a clip, or what a tracker made of one, is a dataset, of slices unless volumes will do.
 
@@ -42,7 +47,7 @@ def check_clip(clip: object, name: str = "clip", volumes: bool = False) -> None:
     if not isinstance(clip, xr.Dataset):
         clips, tracked = "a Repository has one, echotruth.image makes one", "echotruth.track makes one from a clip"
         raise TypeError(f"{name} = {clip!r:.80}: must be a Dataset: {clips if name == 'clip' else tracked}.")
-    if not volumes and "elevation" in clip.coords:
+    if not volumes and is_volume(clip):
         raise ValueError(f"{name}: is of volumes: give one of a short or a long axis.")
 
 
@@ -65,7 +70,7 @@ def check_whole(clip: xr.Dataset, config: Config) -> None:
         With the coordinate that is not that of the image.
     """
     size = clip.sizes["axial"]
-    if "elevation" in clip.coords:
+    if is_volume(clip):
         centres = dict(zip(("axial", "elevation", "lateral"), voxel_centres(config), strict=True))
     else:
         size = size if size in config.bmode.sizes else config.bmode.sizes[0]

@@ -128,9 +128,9 @@ def image(
     probe : str or Probe, optional
         Another array, or its name; what follows the array by default (scan, density of scatterers) follows it.
     size : int, optional
-        Pixels along a side: `bmode.size_px` over one of `bmode.downsampling`. Default: the largest.
+        Pixels along a side: `bmode.size_px` over one of `bmode.downsampling`. Default: the largest. Not of a volume.
     keep_lines : bool
-        Whether the demodulated lines are returned as well.
+        Whether the demodulated lines are returned as well; not of a volume.
     progress : bool
         Whether a line on stderr says how far it is, where a person watches.
 
@@ -141,7 +141,8 @@ def image(
         (m), strain, mask, layer, segment, region, wall_depth, and flow to the previous and to the next frame (m). The
         image shows a slice of tissue of a `thickness` (m); `leaves` and `enters` say which tissue is beside it in the
         next frame, and was in the previous one. Units are attributes of each array. `grid_mask` says which points of
-        the trackers' grid are in the wall.
+        the trackers' grid are in the wall. Of a view whose plane is `volume`: `image` (frame, axial, elevation,
+        lateral), uint8, and `mask`, the wall at end-diastole; :func:`echotruth.voxel_truth` has the rest.
 
     Raises
     ------
@@ -164,14 +165,19 @@ def image(
     if heart.config is None:
         raise ValueError("The heart has no configuration: make it by echotruth.beat, or read one of a Repository.")
     config, name = _imaged_by(heart.config, view, probe)
+    if config.views[name].plane == "volume" and (size is not None or keep_lines):
+        raise ValueError("size, keep_lines: are of slices: volume.size of the configuration sets the voxels.")
     size = image_size(config, size)
     case, (moving, plane) = Case("heart", {}, config), before_probe(heart, config, name)
     random, is_closed = partial(generator, case, name), config.views[name].motion.is_closed
     if plane.is_volume:
-        with progress_line("image", progress):
-            volumes = VolumeSequence(config, moving, plane, random).images(is_closed)
         axial, elevation, lateral = voxel_centres(config)
         mask = wall_mask(moving, plane, axial, lateral, elevation)
+        if not mask.any():
+            where = f"volume.field_mm = {list(config.volume.field_mm)} about rf.focus_mm = {config.rf.focus_mm:g}"
+            raise ValueError(f"There is no wall in the volume: {where} and the offset of the view must suit the heart.")
+        with progress_line("image", progress):
+            volumes = VolumeSequence(config, moving, plane, random).images(is_closed)
         return volume_dataset(case, name, volumes, mask, source_of(heart, plane))
     sequence = Sequence(config, moving, plane, random)
     with progress_line("image", progress):
@@ -201,7 +207,7 @@ def _imaged_by(config: Config, view: str | View, probe: str | Probe | None) -> t
     elif probe is not None:
         config = configure(config, probe=probe.model_dump())
     if isinstance(view, View):
-        return config.model_copy(update={"views": {"view": view}}), "view"
+        return configure(config, views={"view": view.model_dump()}), "view"
     if view not in config.views:
         raise ValueError(f"view = {view!r}: use one of {', '.join(config.views)}, or give a View.")
     return config, view

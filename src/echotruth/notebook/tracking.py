@@ -13,7 +13,7 @@ from echotruth.evaluation.clip import Clip, tracker_seed
 from echotruth.evaluation.points import truth_at
 from echotruth.evaluation.scoring import metrics, score
 from echotruth.heart import Heart
-from echotruth.notebook.arguments import check_clip, check_heart, check_whole
+from echotruth.notebook.arguments import check_clip, check_heart, check_whole, is_volume
 from echotruth.repository.datasets import as_stored, case_of, dataset, imaged_heart
 from echotruth.tracking.plausibility import doubts
 from echotruth.tracking.point_grid import grid_points
@@ -70,13 +70,14 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     0.0
     """
     check_clip(clip, volumes=True)
-    is_volume = "elevation" in clip.coords
-    is_volume = "elevation" in clip.coords
-    if missing := [name for name in ("image", "mask", *["grid_mask"] * (not is_volume)) if name not in clip]:
+    if missing := [name for name in ("image", "mask", *["grid_mask"] * (not is_volume(clip))) if name not in clip]:
         raise ValueError(f"clip: has no {missing[0]}: load it with image and mask among its variables.")
     case = case_of(clip)
     check_whole(clip, case.config)
-    if is_volume:
+    if (unknown := clip["image"].isnull().any([dim for dim in clip["image"].dims if dim != "frame"]).values).any():
+        frames = f"{unknown.sum()} of {len(unknown)} frames have pixels that are NaN"
+        warnings.warn(f"{frames}: no displacement is estimated from these", stacklevel=2)
+    if is_volume(clip):
         from echotruth.notebook.volume import track_volume  # compiled; whoever tracks a slice needs none of it
 
         return track_volume(clip, tracker_section(case.config, tracker, options)).assign_attrs(tracker=_name(tracker))
@@ -85,9 +86,6 @@ def track(clip: xr.Dataset, tracker: str | Callable[..., Any] = "bspline_dic", *
     spacing = case.config.bmode.field_of_view_mm * mm / size
     seed = tracker_seed(case, clip.attrs["view"])
     image, mask = (clip[name].transpose("frame", "axial", "lateral").values for name in ("image", "mask"))
-    if (unknown := np.isnan(image).any(axis=(1, 2))).any():
-        frames = f"{unknown.sum()} of {len(image)} frames have pixels that are NaN"
-        warnings.warn(f"{frames}: no displacement is estimated from these", stacklevel=2)
     arguments = Clip(
         *(image, mask[0], inside, points, spacing, clip["time"].values, seed, case.config.tracking.frame_step),
         is_closed=case.config.views[clip.attrs["view"]].motion.is_closed,
@@ -109,14 +107,16 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     ----------
     tracked : Dataset
         As :func:`track` returns it. One from elsewhere needs `displacement` (frame, axial, lateral, plane), m, since
-        end-diastole, the coordinates axial and lateral, m, and the attributes of the clip.
+        end-diastole, the coordinates axial and lateral, m, and the attributes of the clip; in volumes `displacement`
+        (frame, point, vector), and the positions of the points.
     heart : Heart
         The heart that was imaged.
 
     Returns
     -------
     Series
-        The metrics of the leaderboard, each with its unit in its name, as `nrmse_percent` (docs/conventions.md).
+        The metrics of the leaderboard, each with its unit in its name, as `nrmse_percent` (docs/conventions.md); of
+        volumes those of docs/volumes.md.
 
     Raises
     ------
@@ -134,7 +134,7 @@ def evaluate(tracked: xr.Dataset, heart: Heart) -> pd.Series:
     """
     check_clip(tracked, "tracked", volumes=True)
     check_heart(heart)
-    if "elevation" in tracked.coords:
+    if is_volume(tracked):
         from echotruth.notebook.volume import evaluate_volume  # compiled, as in track
 
         return evaluate_volume(tracked, heart)

@@ -1,5 +1,6 @@
 """Volumes: their data sets, the truth at their voxels, and what was tracked in them."""
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.cases import Case
 from echotruth.config import Config
+from echotruth.config.tracking import BsplineDic
 from echotruth.evaluation.clip import tracker_seed
 from echotruth.evaluation.strain import RADIUS
-from echotruth.evaluation.volume import WallPoints, metrics
+from echotruth.evaluation.volume import VolumePoints, metrics
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.labels import LABELS
@@ -49,7 +51,7 @@ def volume_dataset(
 def voxel_truth(clip: xr.Dataset, heart: Heart, frame: int) -> xr.Dataset:
     """The truth at every voxel of a volume.
 
-    It is computed from the motion of the heart, and not stored: it takes four times the room of the volumes.
+    It is computed from the motion of the heart, and not stored: it takes forty times the room of the volumes.
 
     Parameters
     ----------
@@ -81,12 +83,12 @@ def voxel_truth(clip: xr.Dataset, heart: Heart, frame: int) -> xr.Dataset:
     """
     check_clip(clip, volumes=True)
     check_heart(heart)
-    if not is_volume(clip):
+    if not set(DIMENSIONS) <= set(clip.dims):
         raise ValueError("clip: is no volume: give what echotruth.image makes of a view whose plane is volume.")
     frames = len(heart.displacement)
-    if not 0 <= frame < frames:
-        raise ValueError(f"frame = {frame}: use 0 to {frames - 1}.")
-    config, (moving, plane) = case_of(clip).config, imaged_heart(clip, heart)
+    if isinstance(frame, bool) or not isinstance(frame, int | np.integer) or not 0 <= frame < frames:
+        raise ValueError(f"frame = {frame!r}: use a whole number from 0 to {frames - 1}.")
+    moving, plane = imaged_heart(clip, heart)
     axial, elevation, lateral = (clip[name].values for name in DIMENSIONS)
     truth = PixelTruth(moving, plane, axial, lateral, elevation=elevation, frames=[frame])
     named = dict(zip(LABELS, truth["labels"][0], strict=True))
@@ -96,12 +98,7 @@ def voxel_truth(clip: xr.Dataset, heart: Heart, frame: int) -> xr.Dataset:
         "wall_depth": (DIMENSIONS, truth["wall_depth"][0], {"units": "1"}),
     } | {name: (DIMENSIONS, values, {"units": "1"}) for name, values in named.items()}
     labels = {name: list(schema.LABELS[name]) for name in ("vector", "strain_component")}
-    return xr.Dataset(data, _coordinates(config) | labels | {"frame": frame})
-
-
-def is_volume(clip: xr.Dataset) -> bool:
-    """Whether a clip, or what was tracked in one, is of volumes."""
-    return "elevation" in clip.coords
+    return xr.Dataset(data, {name: clip[name] for name in DIMENSIONS} | labels | {"frame": frame})
 
 
 def track_volume(clip: xr.Dataset, settings: Section) -> xr.Dataset:
@@ -115,6 +112,12 @@ def track_volume(clip: xr.Dataset, settings: Section) -> xr.Dataset:
     """
     case = case_of(clip)
     images, mask = (clip[name].transpose(..., *DIMENSIONS).values for name in ("image", "mask"))
+    if not mask.any():
+        raise ValueError("clip: its mask is empty, so that there is no wall to track.")
+    if any(np.take(mask, [0, -1], axis).any() for axis in range(3)):
+        warnings.warn("the wall reaches a face of the volume: tissue that leaves it is not tracked right", stacklevel=3)
+    if not case.config.views[clip.attrs["view"]].motion.is_closed and isinstance(settings, BsplineDic):
+        settings = settings.model_copy(update={"reference": "previous"})
     voxel = np.array(case.config.volume.voxel_mm) * mm
     steps = np.maximum(1, np.rint(POINT_SPACING * _radius(case.config) / voxel)).astype(int)
     grid = np.zeros(mask.shape, bool)
@@ -136,12 +139,30 @@ def track_volume(clip: xr.Dataset, settings: Section) -> xr.Dataset:
 
 
 def evaluate_volume(tracked: xr.Dataset, heart: Heart) -> pd.Series:
-    """Compare a motion that was tracked in volumes with that of the heart; see :func:`.evaluation.volume.metrics`."""
+    """Compare a motion that was tracked in volumes with that of the heart; see :func:`.evaluation.volume.metrics`.
+
+    Raises
+    ------
+    ValueError
+        If it is no displacement of all frames at points of the wall.
+    """
+    if "displacement" not in tracked or set(tracked["displacement"].dims) != {"frame", "point", "vector"}:
+        raise ValueError("tracked: has no displacement (frame, point, vector): give what et.track returns.")
     moving, plane = imaged_heart(tracked, heart)
-    position = np.column_stack([tracked[name].values for name in ("lateral", "axial", "elevation")])
-    points = WallPoints(moving, plane, position, _radius(case_of(tracked).config))
-    displacement = tracked["displacement"].transpose("frame", "point", "vector").values
-    return pd.Series(metrics(displacement, points, heart.es), name=tracked.attrs.get("tracker"))
+    frames = np.arange(len(heart.displacement))
+    if not np.array_equal(tracked["frame"].values, frames):
+        raise ValueError(f"tracked: must have the frames 0 to {frames[-1]} of the heart, in their order.")
+    points = VolumePoints(moving, plane, tracked_positions(tracked), _radius(case_of(tracked).config))
+    if beside := int((~points.is_in_wall).sum()):
+        raise ValueError(f"tracked: {beside} of its points are not in the wall at end-diastole: leave them out.")
+    displacement = tracked["displacement"].sel(vector=list(schema.LABELS["vector"]))
+    found = metrics(displacement.transpose("frame", "point", "vector").values, points, heart.es)
+    return pd.Series(found, name=tracked.attrs.get("tracker"))
+
+
+def tracked_positions(tracked: xr.Dataset) -> Floats:
+    """Points at end-diastole of what was tracked in volumes, (point, 3), m: lateral, axial, elevation."""
+    return np.column_stack([tracked[name].values for name in schema.LABELS["vector"]])
 
 
 def _radius(config: Config) -> float:

@@ -1,6 +1,7 @@
 """Speckle tracking: displacement of the tissue from B-mode clips.
 
-Points and in-plane vectors are in the order lateral, axial throughout; images are stored (axial, lateral).
+Points and in-plane vectors are in the order lateral, axial throughout, and images are stored (axial, lateral); those of
+volumes are in the order lateral, elevation, depth, and volumes are stored (depth, elevation, lateral).
 """
 
 from echotruth.tracking.failure import TrackerFailed

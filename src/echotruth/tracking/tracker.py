@@ -81,7 +81,7 @@ def track(
 def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """Displacement and quality of the points of a clip, by a method of ours or from outside."""
     if clip.is_volume and type(settings) not in VOLUMETRIC:
-        raise ValueError(f"{settings.method} tracks flat images: volumes need bspline_dic, or a function or program")
+        raise ValueError(f"{settings.method} tracks slices: volumes need bspline_dic, or a function or program")
     if isinstance(settings, OUTSIDE):
         return trackers.function(settings.method)(clip, settings)
     with explained(f"the tracker {settings.method}"):

@@ -17,7 +17,7 @@ from uuid import uuid4
 import yaml
 
 from echotruth import files
-from echotruth.cases import Case, all_cases, expand
+from echotruth.cases import Case, all_cases, repository_cases
 from echotruth.config import Config
 from echotruth.config.diagnosis import bounds_of
 from echotruth.config.loading import ConfigError, validate
@@ -73,15 +73,11 @@ class Plan:
 
     def __init__(self, values: dict[str, Any], source: str = "configuration", folder: Path | None = None) -> None:
         config = validate(dict(values), source)
-        for name, view in config.views.items():
-            if view.plane == "volume":
-                remedy = "a repository has slices: image volumes in Python by echotruth.image (docs/volumes.md)"
-                raise ConfigError(f"{source}: views.{name}.plane = volume: {remedy}")
         self.folder = folder or Path("out") / config.name
         self.config: Config = with_added_trackers(config, self.folder)
         # The files of a repository that stands were checked when it was made.
         self.cases: dict[str, Case] = (
-            all_cases(self.config) if folder else {case.id: case for case in expand(self.config, source)}
+            all_cases(self.config) if folder else {case.id: case for case in repository_cases(self.config, source)}
         )
         self._versions: dict[str, Versions] = {}
         self._attributes: dict[str, dict[str, Any]] = {}

@@ -1,1 +1,1 @@
-"""From the full matrix to focused lines: transmits, receive focusing, and scan lines."""
+"""From the full matrix to focused lines, and from row-column echoes to volumes: transmits, focusing, and scan lines."""

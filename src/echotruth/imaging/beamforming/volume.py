@@ -83,6 +83,8 @@ class VolumeScanner:
         """Weights and delays of all strips for points at coordinates across them, m: (bins, points, strips)."""
         delay = self._ways(along, depth) / self._config.probe.sound_speed_m_per_s - gate.first / self._sampling.rate / 2
         weight = self._aperture.weights(along, depth)
+        # As bright at all depths: more strips see what is deeper, and each hears less of it.
+        weight /= np.linalg.norm(weight, axis=1, keepdims=True)
         low, step = gate.frequency[0], gate.frequency[1] - gate.frequency[0]
         turns = np.exp(2j * np.pi * step * delay).astype(np.complex64)
         phasors = np.empty((len(gate.frequency), *delay.shape), np.complex64)

@@ -1,1 +1,1 @@
-"""Radio-frequency data: the echoes of a medium between all pairs of elements of the array."""
+"""Radio-frequency data: the echoes of a medium between all pairs of elements, or between columns and rows."""
