@@ -27,6 +27,7 @@ from echotruth.evaluation.strain import StrainOperator
 from echotruth.evaluation.volume import VolumePoints
 from echotruth.heart import Heart
 from echotruth.mechanics.fibres import unit
+from echotruth.notebook.volume import tracked_positions
 from echotruth.repository.datasets import imaged_heart
 from echotruth.tracking.tracker import track
 
@@ -87,16 +88,16 @@ def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> di
     first = other[0] - (ratio - 1) / 2 * step
     points = np.column_stack([own[beside].values - first, own["axial"].values - axial[0]]) / step
     found = step * track(images, points, mask, step, clip["time"].values, 0, BsplineDic())[0][heart.es]
-    position = np.column_stack([own[each].values for each in ("lateral", "axial", "elevation")])
+    position = tracked_positions(own)
     wall, in_plane = VolumePoints(*imaged_heart(clip, heart), position, RADIUS), [component, 1]
     true, whole = wall.displacement[heart.es], tracked["displacement"].values[heart.es]
-    errors = {"slice": found - true[:, in_plane], "volume": own["displacement"].values[heart.es][:, in_plane]}
-    errors["volume"] = errors["volume"] - true[:, in_plane]
+    of_volume = own["displacement"].values[heart.es]
+    errors = {"slice": found - true[:, in_plane], "volume": (of_volume - true)[:, in_plane]}
     known = np.isfinite(errors["slice"]).all(axis=1) & np.isfinite(errors["volume"]).all(axis=1)
     size, number = np.linalg.norm(true[known][:, in_plane]), ("RR", "CC", "LL").index(along)
     axes = wall.operator.axes[:, [0, number]][:, :, in_plane]
-    every = np.column_stack([tracked[each].values for each in ("lateral", "axial", "elevation")])
-    strain = VolumePoints(*imaged_heart(clip, heart), every, RADIUS).operator.strain(whole[None])[0, :, number]
+    every = VolumePoints(*imaged_heart(clip, heart), tracked_positions(tracked), RADIUS)
+    strain = every.operator.strain(whole[None])[0, :, number]
     means = {
         "true": wall.strain(heart.es)[:, number].mean(),
         "slice": np.nanmean(StrainOperator(position[:, in_plane], unit(axes), RADIUS).strain(found[None])[0, :, 1]),

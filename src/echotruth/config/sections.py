@@ -27,11 +27,16 @@ _TRACKER_LENGTHS = ("window_mm", "windows_mm", "knots_mm")
 
 
 _RIGHT = "geometry.surface_labels.right_endo"
-_NOT_IN_VOLUMES = {
-    **{"rf.harmonic": False, "phantom.in_plane_only": False, "realism.ring_down.level_dB": None},
-    **{"realism.aberration.delay_ns": 0.0, "realism.shadow.side": "none"},
-    **{"bmode.dropout.loss_dB": 0.0, "bmode.dropout.edge_loss_dB": 0.0},
-    **{"rf.keep": [], "tracking.frame_step": 1},
+_NOT_IN_VOLUMES: dict[str, Any] = {
+    "rf.harmonic": False,
+    "phantom.in_plane_only": False,
+    "realism.ring_down.level_dB": None,
+    "realism.aberration.delay_ns": 0.0,
+    "realism.shadow.side": "none",
+    "bmode.dropout.loss_dB": 0.0,
+    "bmode.dropout.edge_loss_dB": 0.0,
+    "rf.keep": [],
+    "tracking.frame_step": 1,
 }
 """Keys that must have these values where a volume is imaged."""
 
