@@ -44,8 +44,8 @@ except (ConfigError, OSError) as error:
 OUT, STORE = PLAN.folder.as_posix(), PLAN.store.as_posix()
 HEARTS = list(PLAN.hearts)  # material, fibre angles, loop, disease: all that makes a heart move as it does
 CASES = list(PLAN.cases)  # a heart, and how it is imaged: seed of the scatterers, array, realism
-VIEWS = list(PLAN.config.views)  # slices: short axes from base to apex, long axes
-SIZES = list(PLAN.config.bmode.sizes)  # resolutions, px
+VIEWS = list(PLAN.config.views)  # slices: short axes from base to apex, long axes; or volumes
+SIZES = list(PLAN.config.image_names)  # resolutions, px, or volume
 TRACKERS = list(PLAN.config.tracking.trackers)
 
 HEART = f"{STORE}/hearts/{{heart}}/zarr.json"

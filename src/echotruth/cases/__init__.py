@@ -7,7 +7,6 @@ from echotruth.cases.case import Case as Case
 from echotruth.cases.expansion import all_cases as all_cases
 from echotruth.cases.expansion import expand as expand
 from echotruth.cases.expansion import find_case as find_case
-from echotruth.cases.expansion import repository_cases as repository_cases
 from echotruth.cases.ids import case_id as case_id
 from echotruth.cases.tabulation import table as table
 from echotruth.config.diagnosis import diagnosis as diagnosis

@@ -17,7 +17,7 @@ from echotruth.section import dotted_values, value_of
 
 NOT_SWEPT = (
     *("name", "cases", "views", "tracking", "inference", "geometry.shape", "fibres.layers", "loop.frames"),
-    *("rf.keep", "bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling", "pathology.preset"),
+    *("rf.keep", "bmode.field_of_view_mm", "bmode.size_px", "bmode.downsampling", "volume", "pathology.preset"),
 )
 """Keys that cannot be swept (nor can `geometry.*_elements`), because they set the sizes of arrays over all cases, or
 defaults of other sections."""

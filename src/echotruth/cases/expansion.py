@@ -55,21 +55,6 @@ def expand(config: Source, source: str = "configuration") -> list[Case]:
     return [case for _, case in hearts]
 
 
-def repository_cases(config: Config, source: str) -> list[Case]:
-    """Cases of a repository, as :func:`expand` returns them.
-
-    Raises
-    ------
-    ConfigError
-        As of :func:`expand`, or if a view is a volume.
-    """
-    for name, view in config.views.items():
-        if view.plane == "volume":
-            remedy = "a repository has slices: image volumes in Python by echotruth.image (docs/volumes.md)"
-            raise ConfigError(f"{source}: views.{name}.plane = volume: {remedy}")
-    return expand(config, source)
-
-
 def all_cases(config: Config) -> dict[str, Case]:
     """Cases by id; the files that they name need not be there any more."""
     errors = Errors()

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from echotruth.cases import Case, repository_cases
+from echotruth.cases import Case, expand
 from echotruth.cli.command import named
 from echotruth.config import Config, shipped
 from echotruth.config.loading import ConfigError, load
@@ -24,6 +24,6 @@ def load_cases(path: str, expected: str = f"a YAML file, or {LISTED}") -> tuple[
         sys.exit(named(f"{path}: does not exist: {shipped.meant(Path(path)) or f'give {expected}'}"))
     try:
         config = load(path)
-        return config, repository_cases(config, path)
+        return config, expand(config, path)
     except ConfigError as error:
         sys.exit(named(str(error)))

@@ -75,7 +75,7 @@ class View(Section):
     plane: Literal["short_axis", "long_axis", "volume"] = "short_axis"
     """`short_axis`: perpendicular to the long axis. `long_axis`: contains it, seen from the apex. `volume`: the heart
     in three dimensions, as the section `volume` says, by a row-column array of `probe.elements` columns and rows; its
-    middle plane is that of a short axis. It is imaged by `echotruth.image` (docs/volumes.md)."""
+    middle plane is that of a short axis; no view is then a slice (docs/volumes.md)."""
     position: Fraction = 0.5
     """Short axis, volume: position of the plane at end-diastole, 0 at the base, 1 at the endocardial apex."""
     rotation_deg: Annotated[FiniteFloat, Field(ge=-180, le=180)] = 0.0

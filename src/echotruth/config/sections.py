@@ -75,6 +75,21 @@ class Config(Section):
         """Greatest range of the lines, mm."""
         return self.bmode.field_of_view_mm if self.rf.depth_mm is None else self.rf.depth_mm
 
+    @property
+    def has_volumes(self) -> bool:
+        """Whether its views are volumes, and not slices."""
+        return any(view.plane == "volume" for view in self.views.values())
+
+    @property
+    def image_sizes(self) -> tuple[int, ...]:
+        """Pixels along a side of every image size, the largest first; of volumes the most voxels along a side."""
+        return (max(self.volume.size),) if self.has_volumes else self.bmode.sizes
+
+    @property
+    def image_names(self) -> tuple[str, ...]:
+        """What the groups `truth/` and `bmode/` of a view are called: `512` and other sizes, or `volume`."""
+        return ("volume",) if self.has_volumes else tuple(map(str, self.bmode.sizes))
+
     @check
     def _is_no_store(self) -> None:
         remedy = f"must not end in .zarr, as the store does, which is out/NAME/NAME.zarr: write {self.name[:-5]}"
@@ -129,6 +144,7 @@ class Config(Section):
         self.require(tracker in known, "inference.tracker", f"use one of {', '.join(known)}")
         remedy = f"is no image size: use one of {', '.join(map(str, sizes))}"
         self.require(self.inference.size_px in (None, *sizes), "inference.size_px", remedy)
+        self.require(not self.has_volumes, "inference.tracker", "needs slices, and the views are volumes: leave it out")
         remedy = f"needs a loop of pressure and volume, which motion.kind = {kind} has not: leave it out"
         self.require(kind == "beat", "inference.tracker", remedy)
 
@@ -262,8 +278,13 @@ class Config(Section):
 
     @check
     def _check_volumes(self) -> None:
-        if not any(view.plane == "volume" for view in self.views.values()):
+        if not self.has_volumes:
             return
+        for name, view in self.views.items():
+            remedy = (
+                "must be volume as that of other views: write slices, which need another array, in a configuration "
+            )
+            self.require(view.plane == "volume", f"views.{name}.plane", remedy + "of their own")
         amounts.check_voxels(self.volume, self.loop.frames)
         (depth, *across), field = self.volume.field_mm, "volume.field_mm"
         remedy = f"its first side must be smaller than {2 * self.rf.focus_mm:g}, so that the box lies before the array"

@@ -8,6 +8,7 @@ from echotruth.cases import Case
 from echotruth.imaging.labels import unpack
 from echotruth.loop.cycle import frame_times
 from echotruth.repository.reader import Repository
+from echotruth.section import Section
 from echotruth.seeds import generator
 from echotruth.tracking.point_grid import grid_pixels, grid_points
 from echotruth.units import mm
@@ -61,6 +62,10 @@ class Clip:
         """Arguments of a tracker, in the order of :func:`echotruth.tracking.tracker.track`."""
         given = slice(None, None, self.frame_step)
         return self.frames[given], self.points, self.mask, self.spacing, self.frame_time[given], self.seed
+
+    def suited(self, settings: Section) -> Section:
+        """Settings of a tracker for the clip: as they are, since it looks itself whether the cycle is closed."""
+        return settings
 
     @property
     def no_estimate(self) -> tuple[np.ndarray, np.ndarray]:

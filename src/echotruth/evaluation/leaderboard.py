@@ -27,6 +27,9 @@ from echotruth.repository.reader import Repository
 KEYS = ("case", "view", "size_px", "tracker")
 """Columns that identify a row of :func:`rows`."""
 
+STRAIN_ERRORS = [f"{of}e_{component}_rms_pp" for of in ("", "segment_") for component in ("cc", "ll", "rr")]
+"""Metrics whose means have an interval: RMS errors of strain, in volumes of that of segments."""
+
 HEART = "heart"
 """Column that distinguishes the hearts."""
 
@@ -56,11 +59,13 @@ def rows(repository: Repository) -> pd.DataFrame:
 
 def rows_of(repository: Repository, case: str, view: str, trackers: Sequence[str]) -> Iterator[dict]:
     """Rows of one view of a heart by some trackers, those of the largest images first."""
-    failures, plane = estimates.failures(repository, case, view), repository.config.views[view].plane
-    for size, tracker, score in estimates.each(repository, case, view, repository.sizes, trackers, *schema.SCORES):
-        row = dict(zip(KEYS, (case, view, size, tracker), strict=True)) | metrics(score, plane)
+    failures, config = estimates.failures(repository, case, view), repository.config
+    names, plane = ["score", "scores"] if config.has_volumes else [*schema.SCORES], config.views[view].plane
+    for size, tracker, score in estimates.each(repository, case, view, repository.sizes, trackers, *names):
+        row = dict(zip(KEYS, (case, view, size, tracker), strict=True))
+        row |= dict(zip(*score.values(), strict=True)) if config.has_volumes else metrics(score, plane)
         row["failure"] = failures.get((tracker, size), "")
-        yield row | {"no_estimate": of_scores(row, plane, repository.config)}
+        yield row | {"no_estimate": "" if config.has_volumes else of_scores(row, plane, config)}
 
 
 def standings(rows: pd.DataFrame, seed: int, hearts: Mapping[str, str] | None = None) -> pd.DataFrame:
@@ -121,7 +126,7 @@ def _table(clips: pd.DataFrame, clips_of: pd.Series, resamples: np.ndarray) -> p
     table = pd.DataFrame({"tracker": trackers}).set_index("tracker")
     table["hearts"] = every_clip.groupby("tracker").sum()
     table["failures"] = (clips["failure"] != "").groupby(clips["tracker"]).sum()
-    for name in (RANKED_BY, "e_cc_rms_pp", "e_ll_rms_pp", "e_rr_rms_pp"):
+    for name in [name for name in (RANKED_BY, *STRAIN_ERRORS) if name in means]:
         values = means[name].unstack(HEART).reindex(index=trackers, columns=clips_of.index).to_numpy().T
         if name == RANKED_BY:
             table["rank"] = ranks(values.mean(0))

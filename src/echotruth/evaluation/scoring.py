@@ -4,7 +4,10 @@ The formulas stand in :mod:`.displacement_error` (NRMSE and others), :mod:`.agre
 :mod:`.contours` (strain and rotation over the cycle) and :mod:`.statistics`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +21,9 @@ from echotruth.repository import schema
 from echotruth.section import Section
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.tracker import track
+
+if TYPE_CHECKING:
+    from echotruth.evaluation.volume import VolumeClip
 
 Estimate = tuple[np.ndarray, np.ndarray]
 """Displacement and quality, as :func:`.track` returns them."""
@@ -83,10 +89,11 @@ def scored(clips: Iterable[Clip], truth: Truth, found: Iterable[Estimate]) -> di
     return {name: np.stack([row[name] for row in rows]) for name in rows[0]}
 
 
-def estimated(clip: Clip, settings: Section) -> tuple[Estimate, str]:
+def estimated(clip: Clip | VolumeClip, settings: Section) -> tuple[Estimate, str]:
     """What a tracker finds in a clip, as :func:`.track` returns it, and why it failed, or ""."""
+    frames, points, mask, spacing, time, seed = clip.tracker_arguments
     try:
-        return track(*clip.tracker_arguments, settings), ""
+        return track(frames, points, mask, spacing, time, seed, clip.suited(settings)), ""
     except TrackerFailed as error:
         return clip.no_estimate, str(error)
 

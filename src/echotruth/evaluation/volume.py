@@ -7,15 +7,20 @@ points about them (:mod:`.local_fit`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
+from echotruth.cases import Case
+from echotruth.config import Config
+from echotruth.config.tracking import BsplineDic
+from echotruth.evaluation.clip import tracker_seed
 from echotruth.evaluation.statistics import ratio
-from echotruth.evaluation.strain import StrainOperator
+from echotruth.evaluation.strain import RADIUS, StrainOperator
 from echotruth.fem.location import locate
 from echotruth.fem.tetrahedra import MaterialPoints, gradient
 from echotruth.fem.volume import cell_volumes
@@ -24,14 +29,95 @@ from echotruth.imaging.medium.blood import Cavity
 from echotruth.imaging.truth import displacement as true_displacement
 from echotruth.imaging.truth import labels, strain
 from echotruth.imaging.view import Plane
+from echotruth.loop.cycle import frame_times
 from echotruth.mechanics.contours import global_longitudinal_strain
 from echotruth.mechanics.fibres import axes_from_normal
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
+from echotruth.section import Section
+from echotruth.tracking.point_grid import grid_voxels, voxel_positions
+from echotruth.units import mm
 
 COMPONENTS = ("rr", "cc", "ll", "rc", "rl", "cl")
 """Components of strain, in the order of the arrays."""
 FEWEST = 8
 """Points of a segment from which on it has a mean."""
+POINT_SPACING = 0.45
+"""Distance of the points that trackers follow, over the radius of the strain operator."""
+
+
+@dataclass(frozen=True)
+class VolumeClip:
+    """Volumes of one view of one heart, as trackers receive them; they count lateral first, as in an image.
+
+    Attributes
+    ----------
+    case : Case
+    view : str
+    frames : ndarray of shape (frame, axial, elevation, lateral), uint8
+        B-mode; frame 0 is end-diastole.
+    mask : ndarray of shape (axial, elevation, lateral), bool
+        The wall at end-diastole.
+    """
+
+    case: Case
+    view: str
+    frames: NDArray[np.uint8]
+    mask: NDArray[np.bool_]
+
+    @property
+    def size(self) -> int:
+        """The most voxels along a side."""
+        return max(self.mask.shape)
+
+    @cached_property
+    def voxels(self) -> NDArray[np.int64]:
+        """Voxels that are followed: those of the grid in the wall, (point, 3); axial, elevation, lateral."""
+        grid: NDArray[np.int64] = grid_voxels(self.case.config, POINT_SPACING * strain_radius(self.case.config))
+        return grid[self.mask[tuple(grid.T)]]
+
+    @property
+    def positions(self) -> Floats:
+        """Positions of the points at end-diastole, (point, 3), m: lateral, axial, elevation."""
+        return voxel_positions(self.case.config, self.voxels)
+
+    @property
+    def spacing(self) -> Floats:
+        """Sides of a voxel, (3,), m: lateral, elevation, axial."""
+        return np.array(self.case.config.volume.voxel_mm)[::-1] * mm
+
+    @property
+    def tracker_arguments(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, int]:
+        """Arguments of a tracker, in the order of :func:`echotruth.tracking.tracker.track`."""
+        points, time = self.voxels[:, ::-1].astype(float), frame_times(self.case.config.loop)
+        return self.frames, points, self.mask, self.spacing, time, tracker_seed(self.case, self.view)
+
+    def suited(self, settings: Section) -> Section:
+        """Settings of a tracker; those of ours are told that a cycle is open, which they do not look for in volumes."""
+        if isinstance(settings, BsplineDic) and not self.case.config.views[self.view].motion.is_closed:
+            return settings.model_copy(update={"reference": "previous"})
+        return settings
+
+    @property
+    def no_estimate(self) -> tuple[Floats, Floats]:
+        """Displacement (frame, point, 3) and quality (frame, point) of a tracker that failed, all NaN."""
+        shape = len(self.frames), len(self.voxels)
+        return np.full((*shape, 3), np.nan), np.full(shape, np.nan)
+
+    def arrays(self, displacement: Floats, quality: Floats) -> dict[str, Floats]:
+        """Displacement (frame, point, 3), m, and quality of what a tracker found: lateral, axial, elevation."""
+        return {"displacement": (displacement * self.spacing)[..., [0, 2, 1]], "quality": quality}
+
+
+def strain_radius(config: Config) -> float:
+    """Radius of the strain operator, m: that in the image of a slice."""
+    return RADIUS * config.bmode.field_of_view_mm * mm
+
+
+def volume_points(heart: Heart, plane: Plane, config: Config) -> VolumePoints:
+    """Points that trackers follow in the volumes of a heart, as it moves before the probe."""
+    grid = voxel_positions(config, grid_voxels(config, POINT_SPACING * strain_radius(config)))
+    every = VolumePoints(heart, plane, grid, strain_radius(config))
+    return replace(every, position=grid[every.is_in_wall])
 
 
 @dataclass(frozen=True)
@@ -61,8 +147,8 @@ class VolumePoints:
 
     @property
     def is_in_wall(self) -> NDArray[np.bool_]:
-        """Whether each point is in the wall at end-diastole, (point,)."""
-        return self._material.cell >= 0
+        """Whether each point is in the left wall at end-diastole, (point,)."""
+        return (self._material.cell >= 0) & ~self.heart.right_wall[self._material.cell]
 
     @cached_property
     def displacement(self) -> Floats:
@@ -71,9 +157,15 @@ class VolumePoints:
         return np.stack([true_displacement(self.heart, frame, self._material) @ self.plane.axes.T for frame in frames])
 
     @cached_property
-    def segment(self) -> NDArray[np.generic]:
-        """AHA segment of each point, (point,)."""
-        return labels(self.heart, self._material)["segment"]
+    def labels(self) -> dict[str, NDArray[np.generic]]:
+        """Layer, AHA segment and region of disease of each point, (point,)."""
+        return labels(self.heart, self._material)
+
+    @property
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Arrays of the group `points`."""
+        found = {"position": self.position, "true_displacement": self.displacement, "es_frame": np.array(self.heart.es)}
+        return found | {name: self.labels[name] for name in ("layer", "segment")}
 
     def strain(self, frame: int) -> Floats:
         """True Green-Lagrange strain since end-diastole in a frame, (point, 6): RR, CC, LL, RC, RL, CL."""
@@ -121,7 +213,7 @@ def metrics(displacement: Floats, points: VolumePoints, es: int) -> dict[str, fl
         segments, all six components, against the strain of the elements; bias of GLS, of twist and of ejection
         fraction.
     """
-    true: Floats = points.displacement
+    true, displacement = points.displacement, np.asarray(displacement, float)
     known = np.asarray(np.isfinite(displacement).all(axis=-1))
     error = np.where(known[..., None], displacement - true, np.nan)
     at_rest = np.where(known[..., None], error, -true)
@@ -155,7 +247,7 @@ def segment_strain(displacement: Floats, points: VolumePoints) -> Floats:
 def _segment_means(strains: Floats, points: VolumePoints) -> Floats:
     means = np.full((17, strains.shape[1]), np.nan)
     for number in range(17):
-        own = strains[points.segment == number + 1]
+        own = strains[points.labels["segment"] == number + 1]
         own = own[np.isfinite(own).all(axis=1)]
         if len(own) >= FEWEST:
             means[number] = own.mean(axis=0)

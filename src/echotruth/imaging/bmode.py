@@ -339,6 +339,28 @@ def largest_clip(
     return grey_images(envelope_images(lines, scan, range_, bmode, gain), inside, bmode, is_closed)
 
 
+def volume_images(volumes: np.ndarray, step: np.ndarray, gain: np.ndarray, bmode: Bmode, is_closed: bool) -> np.ndarray:
+    """B-mode of volumes.
+
+    Parameters
+    ----------
+    volumes, step
+        As :meth:`.VolumeSequence.volumes` returns them.
+    gain
+        Of :func:`time_gain_compensation`, shape (axial,).
+    bmode, is_closed
+        As of :func:`grey_images`.
+
+    Returns
+    -------
+    Shape (frames, axial, elevation, lateral), uint8.
+    """
+    images = np.empty(volumes.shape[:-1], np.float32)
+    for image, parts, one in zip(images, volumes, step.astype(np.float32), strict=True):
+        np.multiply(np.abs((parts * one).view(np.complex64)[..., 0]), gain[:, None, None], out=image)
+    return grey_images(images, np.ones(images.shape[1:], bool), bmode, is_closed)
+
+
 def grey_images(images: np.ndarray, inside: np.ndarray, bmode: Bmode, is_closed: bool = True) -> np.ndarray:
     """Envelopes, compressed and filtered as a scanner does.
 

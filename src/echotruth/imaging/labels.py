@@ -54,13 +54,15 @@ def pack(labels: Mapping[str, NDArray[np.generic]]) -> NDArray[np.generic]:
     return np.stack([labels[name] for name in LABELS])
 
 
-def unpack(labels: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
+def unpack(labels: NDArray[np.uint8], dims: int = 2) -> dict[str, NDArray[Any]]:
     """Labels by name, as views of the packed array, and the wall.
 
     Parameters
     ----------
     labels : ndarray of shape (..., 3, axial, lateral), uint8
         As the repository has it: (frame, label, axial, lateral).
+    dims : int
+        Dimensions of the image: 3 of a volume, whose labels are (..., 3, axial, elevation, lateral).
 
     Returns
     -------
@@ -68,5 +70,5 @@ def unpack(labels: NDArray[np.uint8]) -> dict[str, NDArray[Any]]:
         mask (bool; whether the pixel centre is in the wall), layer (1 at the endocardium, 0 outside of the wall), AHA
         segment (0 outside) and region of disease (0 healthy or outside), uint8.
     """
-    named = {name: labels[..., index, :, :] for index, name in enumerate(LABELS)}
+    named = dict(zip(LABELS, np.moveaxis(labels, -1 - dims, 0), strict=True))
     return {"mask": named["layer"] > 0, **named}

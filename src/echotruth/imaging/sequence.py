@@ -1,6 +1,7 @@
 """A sequence: all frames of one view, from the scatterers to the lines."""
 
 import logging
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -15,6 +16,8 @@ from echotruth.imaging.medium.body import Arrays, Scene
 from echotruth.imaging.medium.medium import Medium, seed_medium
 from echotruth.imaging.medium.random_process import Random
 from echotruth.imaging.recorder import RfRecorder
+from echotruth.imaging.rf.full_matrix import FullMatrix
+from echotruth.imaging.rf.row_column import RowColumn
 from echotruth.imaging.view import Plane
 from echotruth.loop.cycle import frame_times
 from echotruth.units import mm
@@ -49,7 +52,12 @@ class Sequence:
 
     def scatterers(self) -> Arrays:
         """Draw the scatterers of the view; see :func:`echotruth.imaging.medium.medium.seed_medium`."""
-        return seed_medium(self._scene, full_matrix(*self._array).in_beam)
+        return seed_medium(self._scene, self._matrix.in_beam)
+
+    @property
+    def _matrix(self) -> FullMatrix | RowColumn:
+        """The array, which hears scatterers or not."""
+        return full_matrix(*self._array)
 
     def acquisition(self, scatterers: Arrays) -> Acquisition:
         """Return what makes the full matrix of any frame."""
@@ -74,12 +82,15 @@ class Sequence:
         ndarray of shape (frame, lines, ranges), complex64
             Demodulated lines, as of :meth:`echotruth.imaging.beamforming.scanner.Scanner.lines`.
         """
-        acquire, frames, lines = self.acquisition(scatterers), len(self._scene.heart.displacement), []
+        return np.stack(list(self.frames(scatterers, recorder)))
+
+    def frames(self, scatterers: Arrays, recorder: RfRecorder | None = None) -> Iterator[NDArray[np.complex64]]:
+        """One frame after another, as the scanner beamforms it; the parameters are those of :meth:`lines`."""
+        acquire, frames = self.acquisition(scatterers), len(self._scene.heart.displacement)
         for frame in range(frames):
             # The matrix has no name here, so that its memory is free for beamforming.
-            lines.append(self.scanner.beamform(_recorded(acquire(frame), frame, recorder)))
+            yield self.scanner.beamform(_recorded(acquire(frame), frame, recorder))
             logger.info("frame %d of %d", frame + 1, frames)
-        return np.stack(lines)
 
 
 def _recorded(matrix: NDArray[np.complex64], frame: int, recorder: RfRecorder | None) -> NDArray[np.complex64]:

@@ -1,44 +1,46 @@
 """A sequence of volumes: all frames of a heart before a row-column array."""
 
-import logging
-from collections.abc import Iterator
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.config import Config
-from echotruth.heart import Heart
-from echotruth.imaging.acquisition import Acquisition
 from echotruth.imaging.beamforming.volume import VolumeScanner
-from echotruth.imaging.bmode import grey_images, time_gain_compensation
-from echotruth.imaging.medium.body import Scene
-from echotruth.imaging.medium.medium import Medium, seed_medium
-from echotruth.imaging.medium.random_process import Random
-from echotruth.imaging.view import Plane
-from echotruth.loop.cycle import frame_times
-
-logger = logging.getLogger("echotruth")
+from echotruth.imaging.medium.body import Arrays
+from echotruth.imaging.recorder import quantise
+from echotruth.imaging.rf.row_column import RowColumn
+from echotruth.imaging.sequence import Sequence
 
 
-class VolumeSequence:
+class VolumeSequence(Sequence):
     """A heart before a row-column array, imaged frame by frame; parameters are those of :class:`.Sequence`."""
 
-    def __init__(self, config: Config, heart: Heart, plane: Plane, random: Random) -> None:
-        self._scene = Scene(config, heart, plane, random, frame_times(config.loop))
-        self.scanner = VolumeScanner(config)
+    @cached_property
+    def scanner(self) -> VolumeScanner:  # type: ignore[override]  # beamforms as the other does
+        """What beamforms the volumes."""
+        return VolumeScanner(self._scene.config)
 
-    def volumes(self) -> Iterator[NDArray[np.complex64]]:
-        """The volume (axial, elevation, lateral) of every frame, complex64, demodulated."""
-        scene, frames = self._scene, len(self._scene.heart.displacement)
-        medium = Medium(scene, seed_medium(scene, self.scanner.matrix.in_beam))
-        acquire = Acquisition(scene.config, self.scanner, medium, scene.random)
-        for frame in range(frames):
-            yield self.scanner.beamform(acquire(frame))
-            logger.info("frame %d of %d", frame + 1, frames)
+    @property
+    def _matrix(self) -> RowColumn:
+        return self.scanner.matrix
 
-    def images(self, is_closed: bool) -> NDArray[np.uint8]:
-        """B-mode (frame, axial, elevation, lateral) of all volumes, of a cycle that is closed or open."""
-        config = self._scene.config
-        gain = time_gain_compensation(config.probe, config.bmode, self.scanner.axial)[:, None, None]
-        images = np.stack([np.abs(volume) * gain for volume in self.volumes()])
-        return grey_images(images, np.ones(images.shape[1:], bool), config.bmode, is_closed)
+    def volumes(self, scatterers: Arrays) -> dict[str, NDArray[Any]]:
+        """Image all frames.
+
+        Parameters
+        ----------
+        scatterers : dict of ndarray
+            As :meth:`scatterers` returns them.
+
+        Returns
+        -------
+        dict of ndarray
+            Demodulated, in 16 bits, since all are in memory together: volumes (frame, axial, elevation, lateral, part),
+            int16, in-phase and quadrature; and volumes_step (frame,), the value of one step.
+        """
+        frames, shape = len(self._scene.heart.displacement), self._scene.config.volume.size
+        volumes, step = np.empty((frames, *shape, 2), np.int16), np.empty(frames)
+        for frame, volume in enumerate(self.frames(scatterers)):
+            volumes[frame], step[frame] = quantise(volume.view(np.float32).reshape(*shape, 2))
+        return {"volumes": volumes, "volumes_step": step}

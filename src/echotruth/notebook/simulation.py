@@ -16,7 +16,7 @@ from echotruth.config.building import Source, configure
 from echotruth.config.diagnosis import bounds_of
 from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import voxel_centres
-from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres
+from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres, time_gain_compensation, volume_images
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
 from echotruth.imaging.truth import pixel_truth, wall_mask
@@ -28,9 +28,8 @@ from echotruth.mechanics.beat import simulate
 from echotruth.mechanics.bounds import violation
 from echotruth.mechanics.physiology import measured_heart
 from echotruth.notebook.arguments import check_heart
-from echotruth.notebook.volume import volume_dataset
 from echotruth.repository.choice import image_size
-from echotruth.repository.datasets import as_stored, clip_dataset, source_of
+from echotruth.repository.datasets import as_stored, clip_dataset, source_of, volume_dataset
 from echotruth.seeds import generator
 from echotruth.tracking.point_grid import grid_positions
 
@@ -177,8 +176,11 @@ def image(
             where = f"volume.field_mm = {list(config.volume.field_mm)} about rf.focus_mm = {config.rf.focus_mm:g}"
             raise ValueError(f"There is no wall in the volume: {where} and the offset of the view must suit the heart.")
         with progress_line("image", progress):
-            volumes = VolumeSequence(config, moving, plane, random).images(is_closed)
-        return volume_dataset(case, name, volumes, mask, source_of(heart, plane))
+            volumes = VolumeSequence(config, moving, plane, random)
+            found = volumes.volumes(volumes.scatterers())
+        gain = time_gain_compensation(config.probe, config.bmode, axial)
+        volume = volume_images(found["volumes"], found["volumes_step"], gain, config.bmode, is_closed)
+        return volume_dataset(case, name, volume, mask, source_of(heart, plane))
     sequence = Sequence(config, moving, plane, random)
     with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range

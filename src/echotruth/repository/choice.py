@@ -48,7 +48,7 @@ def image_size(config: Config, size: int | None) -> int:
     ValueError
         If the configuration has no clips of that size.
     """
-    return config.bmode.sizes[0] if size is None else require_known("size", size, config.bmode.sizes)
+    return config.image_sizes[0] if size is None else require_known("size", size, config.image_sizes)
 
 
 def main_view(config: Config) -> str:

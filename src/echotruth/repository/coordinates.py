@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from echotruth.config import Config
+from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.loop.cycle import frame_times
 from echotruth.repository import schema, scores
@@ -28,6 +29,10 @@ def coordinates_of(group: str, config: Config) -> dict[str, ArrayLike]:
     found: dict[str, ArrayLike] = {**schema.LABELS, "frame": frames, "time": frame_times(config.loop)}
     found |= {"layer": layers, "region": [0, *layers], "aha": np.arange(1, 18)}
     stage, _, size = group.partition("/")
+    if config.has_volumes:
+        if stage in ("truth", "bmode", "rf"):
+            found |= dict(zip(("axial", "elevation", "lateral"), voxel_centres(config), strict=True))
+        return found
     if stage in ("truth", "bmode"):
         axial, lateral = pixel_centres(config.bmode, int(size))
         found |= {"axial": axial, "lateral": lateral}

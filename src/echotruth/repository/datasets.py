@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from echotruth.cases import Case
 from echotruth.config.building import configure
 from echotruth.heart import Heart
+from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane, moved
 from echotruth.loop.cycle import frame_times
@@ -21,6 +22,9 @@ from echotruth.tracking.point_grid import grid_positions
 
 if TYPE_CHECKING:
     import xarray as xr
+
+VOLUME = ("axial", "elevation", "lateral")
+"""Dimensions of a volume, in the order of its voxels."""
 
 SOURCE = ("plane_origin", "plane_axes", "motion")
 """Attributes of a clip, and of its truth in a repository, that say of what it is the image."""
@@ -53,6 +57,17 @@ def clip_dataset(
     return found.assign_attrs(case=case.id, view=view, **source, config=case.config.model_dump_json())
 
 
+def volume_dataset(
+    case: Case, view: str, images: NDArray[np.uint8], mask: NDArray[np.bool_], source: dict[str, Any]
+) -> xr.Dataset:
+    """Volumes (frame, axial, elevation, lateral) and the wall at end-diastole, as :func:`clip_dataset` has clips."""
+    centres = dict(zip(VOLUME, voxel_centres(case.config), strict=True))
+    data = dataset(case, {"bmode/volume": {"image": images}}, {**centres, "frame": np.arange(len(images))})
+    about = {"units": "1", "long_name": "whether a voxel is in the wall at ED"}
+    data = data.assign(mask=(VOLUME, mask, about))
+    return data.assign_attrs(case=case.id, view=view, **source, config=case.config.model_dump_json())
+
+
 def source_of(heart: Heart, plane: Plane) -> dict[str, Any]:
     """Attributes `SOURCE`: origin and axes of the plane, and what identifies the motion of the heart."""
     found = plane.origin.tolist(), plane.axes.ravel().tolist(), fingerprint(heart)
@@ -64,7 +79,7 @@ def as_stored(case: Case, groups: dict[str, dict[str, Any]]) -> dict[str, dict[s
     return {
         group: {
             name: rounding.as_stored(values[name], array, case.config)
-            for name, array in schema.arrays_of(group).items()
+            for name, array in schema.arrays_of(group, case.config.has_volumes).items()
             if name in values
         }
         for group, values in groups.items()
@@ -77,7 +92,7 @@ def dataset(case: Case, groups: dict[str, dict[str, Any]], coordinates: dict[str
 
     found = {}
     for group, values in groups.items():
-        for array in schema.arrays_of(group).values():
+        for array in schema.arrays_of(group, case.config.has_volumes).values():
             if array.name in values:
                 dims = [dim for dim in array.dims if dim != "size"]
                 about: dict[str, Any] = {"units": array.units, "long_name": array.long_name}

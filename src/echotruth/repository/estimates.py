@@ -67,6 +67,8 @@ def tracked(repository: Repository, case: str, view: str, tracker: str, size: in
     at, group = repository.sizes.index(require_known("size", size, repository.sizes)), f"tracking/{tracker}"
     if problem := repository.problem(case, view, group):
         raise NotEvaluated(f"tracker = {tracker!r}: {problem}.")
+    if repository.config.has_volumes:
+        return repository.arrays(group, case, view, *names)
     found = {name: repository.read(f"{group}/{name}", case, view, at) for name in names if name not in schema.SCORES}
     if len(found) < len(names):
         table = repository.read(f"{group}/scores", case, view, at)

@@ -99,7 +99,7 @@ def write(
     attributes : dict
         Attributes of the group.
     """
-    arrays = {name: array for name, array in schema.arrays_of(group).items() if name in values}
+    arrays = {name: array for name, array in schema.arrays_of(group, config.has_volumes).items() if name in values}
     dims = {dim for array in arrays.values() for dim in array.dims}
     opened = zarr.create_group(folder, zarr_format=3)
     is_of_cycle = group == "points" or group.startswith("tracking/")
@@ -149,7 +149,7 @@ def read(store: Any, path: str, *names: str) -> Arrays:
     """
     group = open_group(store, path)
     if isinstance(store, Path):  # first, since Zarr raises many kinds of what is damaged
-        _verify(store, path, names or schema.arrays_of(group_of(path)))
+        _verify(store, path, names or schema.names_of(group_of(path)))
     present: dict[str, Any] = {} if names else dict(group.arrays())
     for name in names:
         try:
@@ -158,7 +158,7 @@ def read(store: Any, path: str, *names: str) -> Arrays:
             why = group.attrs.get("reason")
             lacking = f"{store}: {path} has no {name}: {why or 'run its configuration with this version'}"
             raise NotWritten(lacking) from None
-    wanted = names or [name for name in schema.arrays_of(group_of(path)) if name in present]
+    wanted = names or [name for name in schema.names_of(group_of(path)) if name in present]
     return {name: part(present[name]) for name in wanted}
 
 
@@ -240,7 +240,7 @@ def _fill(array: Array) -> float | int | str:
 
 def _compressor(array: Array) -> BloscCodec | ZstdCodec:
     """Compressor that suits the content: bits of images side by side, bytes of numbers, text as it is."""
-    if array.dtype == "uint8" and array.dims[-2:] == ("axial", "lateral"):
+    if array.dtype == "uint8" and array.dims[-1:] == ("lateral",):
         return BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
     if array.dtype in ("string", "bool", "uint8"):
         return ZstdCodec(level=3)

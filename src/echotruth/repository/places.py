@@ -77,7 +77,7 @@ def jobs_of(case: str, config: Config) -> Iterator[JobPlace]:
 
 
 def groups_of(stage: str, sizes: Iterable[object], tracker: str | None = None) -> list[str]:
-    """Groups that a job makes for a heart or a view, given the image sizes: those of which Snakemake knows."""
+    """Groups that a job makes for a heart or a view, given the names of its images: those of which Snakemake knows."""
     if stage in SIZED:
         return [f"{stage}/{size}" for size in sizes]
     if stage == "tracking":

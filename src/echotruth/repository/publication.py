@@ -78,7 +78,7 @@ def asked_for(cases: list[Case]) -> list[str]:
         place(group, case.heart, case.id, job.view)
         for case in cases
         for job in jobs_of(case.id, case.config)
-        for group in groups_of(job.stage, case.config.bmode.sizes, job.tracker)
+        for group in groups_of(job.stage, case.config.image_names, job.tracker)
     )
     return list(dict.fromkeys(paths))
 

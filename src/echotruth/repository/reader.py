@@ -195,8 +195,8 @@ class Repository:
 
     @property
     def sizes(self) -> list[int]:
-        """Pixels along a side of the images, the largest first."""
-        return list(self.config.bmode.sizes)
+        """Pixels along a side of the images, the largest first; of volumes the most voxels along a side."""
+        return list(self.config.image_sizes)
 
     @property
     def trackers(self) -> list[str]:
@@ -242,7 +242,7 @@ class Repository:
     def clip(
         self, case: str | None = None, view: str | None = None, size: int | None = None, variables: Names = None
     ) -> xr.Dataset:
-        """Read a clip with its truth, as :func:`echotruth.image` returns it.
+        """Read a clip with its truth, or volumes, as :func:`echotruth.image` returns them.
 
         Parameters
         ----------
@@ -266,21 +266,38 @@ class Repository:
         """
         # Here and not above: what they import takes longer than opening a repository.
         from echotruth.imaging.labels import unpack
-        from echotruth.repository.datasets import SOURCE, clip_dataset
+        from echotruth.repository.datasets import clip_dataset
         from echotruth.repository.derived import stored_names
         from echotruth.tracking.point_grid import grid_pixels
 
         found, view, size = self.case(case), self.view(view), image_size(self.config, size)
+        if self.config.has_volumes:
+            return self._volumes(found, view)
         arrays = {path: schema.arrays_of(path) for path in (f"bmode/{size}", f"truth/{size}")}
         wanted = stored_names(variables, {name for members in arrays.values() for name in members})
         names = {path: [name for name in members if name in wanted] for path, members in arrays.items()}
         values = {path: self.arrays(path, found.id, view, *members) for path, members in names.items() if members}
         largest = f"truth/{self.sizes[0]}"
         at_ed = self.read(f"{largest}/labels", found.id, view, 0)  # only those of frame 0, of which each is a chunk
-        inside, about = unpack(at_ed)["mask"][grid_pixels(found.config)], self.attributes(largest, found.id, view)
+        inside = unpack(at_ed)["mask"][grid_pixels(found.config)]
+        return clip_dataset(found, view, values, inside, self._source(largest, found.id, view))
+
+    def _volumes(self, case: Case, view: str) -> xr.Dataset:
+        from echotruth.imaging.labels import unpack
+        from echotruth.repository.datasets import volume_dataset
+
+        images = self.arrays("bmode/volume", case.id, view, "image")["image"]
+        mask = unpack(self.read("truth/volume/labels", case.id, view, 0), 3)["mask"]
+        return volume_dataset(case, view, images, mask, self._source("truth/volume", case.id, view))
+
+    def _source(self, truth: str, case: str, view: str) -> dict[str, Any]:
+        """Attributes of the truth of a clip that say of what it is the image."""
+        from echotruth.repository.datasets import SOURCE
+
+        about = self.attributes(truth, case, view)
         if not about.keys() >= set(SOURCE):
-            raise NotWritten(f"{self._place}: {found.id} {view} is of an earlier version: run its configuration again")
-        return clip_dataset(found, view, values, inside, {name: about[name] for name in SOURCE})
+            raise NotWritten(f"{self._place}: {case} {view} is of an earlier version: run its configuration again")
+        return {name: about[name] for name in SOURCE}
 
     def tracks(
         self, case: str | None = None, view: str | None = None, size: int | None = None, trackers: Names = None
@@ -515,7 +532,7 @@ class Repository:
         """Why stages of a heart, or of one of its views, are not complete, in one sentence; "" if they are."""
         for stage in stages:
             place = (case,) if stage in OF_HEART or view is None else (case, view)
-            for name in groups_of(stage, self.sizes):
+            for name in groups_of(stage, self.config.image_names):
                 found, what = self.attributes(name, *place), " ".join(place)
                 if not found:
                     return f"{self._place} has no {stage} of {what} yet: run it to its end, or fetch this heart too"

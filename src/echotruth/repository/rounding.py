@@ -35,8 +35,9 @@ def quantum(array: Array, config: Config) -> float | None:
 
 
 def length_quantum(config: Config) -> float:
-    """Largest power of two that is not above 1/256 of the pixel of the largest image, m."""
-    pixel = config.bmode.field_of_view_mm * mm / max(config.bmode.sizes)
+    """Largest power of two that is not above 1/256 of the pixel of the largest image, or of a voxel's side, m."""
+    sides = config.volume.voxel_mm if config.has_volumes else (config.bmode.field_of_view_mm / max(config.bmode.sizes),)
+    pixel = min(sides) * mm
     return float(2.0 ** floor(log2(pixel / 256)))
 
 

@@ -23,6 +23,9 @@ KINDS = {
 }
 """Arrays by the kind of their group, such as `truth/SIZE`."""
 
+OF_VOLUMES = " (volumes)"
+"""End of the name of a kind of group that has other arrays where views are volumes."""
+
 COORDINATES = {array.name: array for array in KINDS.pop("coordinates")}
 """Coordinates by their name; a group has those along the dimensions of its arrays."""
 
@@ -45,15 +48,21 @@ LABELS = {row["array"]: tuple(row["labels"].split()) for row in _ROWS if row["la
 """Labels of the dimensions that are the same in every repository."""
 
 
-def kind(group: str) -> str:
-    """Kind of a group: of `truth/512`, `truth/SIZE`; of `tracking/dis`, `tracking/TRACKER`."""
+def kind(group: str, has_volumes: bool = False) -> str:
+    """Kind of a group: of `truth/512`, `truth/SIZE`; of `tracking/dis`, `tracking/TRACKER` or that of volumes."""
     stage, _, name = group.partition("/")
-    return f"{stage}/SIZE" if name.isdigit() else "tracking/TRACKER" if name and stage == "tracking" else group
+    found = f"{stage}/SIZE" if name.isdigit() else "tracking/TRACKER" if name and stage == "tracking" else group
+    return f"{found}{OF_VOLUMES}" if has_volumes and f"{found}{OF_VOLUMES}" in KINDS else found
 
 
-def arrays_of(group: str) -> dict[str, Array]:
+def arrays_of(group: str, has_volumes: bool = False) -> dict[str, Array]:
     """Arrays of a group, as "bmode/512", by their names."""
-    return {array.name: array for array in KINDS[kind(group)]}
+    return {array.name: array for array in KINDS[kind(group, has_volumes)]}
+
+
+def names_of(group: str) -> list[str]:
+    """Names of the arrays that a group may have, of slices or of volumes."""
+    return list(arrays_of(group) | arrays_of(group, has_volumes=True))
 
 
 def observations(config: Config) -> list[str]:

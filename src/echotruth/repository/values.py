@@ -5,6 +5,7 @@ A fault that is found here stands in bytes that are as their job wrote them: it 
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from typing import Any
 
@@ -83,8 +84,8 @@ def faults(group: str, arrays: Arrays, config: Config) -> Iterator[tuple[str, st
     name, problem : str
         Name of the array, and what is wrong with it.
     """
-    stage, kinds = group.partition("/")[0], {name: array.values for name, array in schema.arrays_of(group).items()}
-    kind = schema.kind(group)
+    stage, kind = group.partition("/")[0], schema.kind(group, config.has_volumes)
+    kinds = {name: array.values for name, array in schema.arrays_of(group, config.has_volumes).items()}
     for name, values in arrays.items():
         for problem in _in_range(values, RANGES[kinds[name]]):
             yield name, problem
@@ -154,22 +155,27 @@ def _phantom(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
 
 
 def _truth(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
-    label = unpack(arrays["labels"])
-    mask = label["mask"]
+    mask = unpack(arrays["labels"])["mask"]
     for name in ("displacement", "strain", "wall_depth"):
         known = np.isfinite(arrays[name])
         if bool(((known.all(-1) if known.ndim > mask.ndim else known) != mask).any()):
             yield name, "is not a number in a pixel of the wall, or is one outside"
-    if bool(((label["segment"] > 0) != mask).any()) or bool(label["region"][~mask].any()):
-        yield "labels", "has a pixel of the wall without a segment, or a segment or region outside"
-    for name, highest in {"layer": config.fibres.layers, "segment": 17, "region": 3}.items():
-        if label[name].max(initial=0) > highest:
-            yield "labels", f"has a {name} of {label[name].max()}, above {highest}"
+    yield from _wall_labels(arrays, config)
     if "tissue" in arrays and bool(((arrays["tissue"] == TissueLabel.WALL) != mask).any()):
         yield "tissue", "is not the wall in a pixel of the wall, or is it outside"
     if bool((np.isfinite(arrays["flow"]).all(-1) != _has_flow(mask)).any()):
         yield "flow", "is not a number in a pixel of the wall from which there is a frame, or is one elsewhere"
     yield from _still_at_ed("displacement", arrays)
+
+
+def _wall_labels(arrays: Arrays, config: Config, dims: int = 2) -> Iterator[tuple[str, str]]:
+    label = unpack(arrays["labels"], dims)
+    mask = label["mask"]
+    if bool(((label["segment"] > 0) != mask).any()) or bool(label["region"][~mask].any()):
+        yield "labels", "has a pixel of the wall without a segment, or a segment or region outside"
+    for name, highest in {"layer": config.fibres.layers, "segment": 17, "region": 3}.items():
+        if label[name].max(initial=0) > highest:
+            yield "labels", f"has a {name} of {label[name].max()}, above {highest}"
 
 
 def _has_flow(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -193,10 +199,14 @@ def _points(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
         yield "wall_axes", "has axes whose length is not 1 in the wall"
 
 
-def _tracking(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+def _quality(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
     known, stated = np.isfinite(arrays["displacement"]).all(-1), np.isfinite(arrays["quality"])
     if stated.any() and bool((known != stated).any()):  # a tracker may state none at all
         yield "quality", "is given where there is no displacement, or the reverse"
+
+
+def _tracking(arrays: Arrays, config: Config) -> Iterator[tuple[str, str]]:
+    yield from _quality(arrays, config)
     for name, values in scores.unpacked(arrays["scores"], config).items():
         for problem in _in_range(values, RANGES[schema.SCORES[name].values]):
             yield name, problem
@@ -219,7 +229,10 @@ RELATIONS: dict[str, Callable[[Arrays, Config], Iterator[tuple[str, str]]]] = {
     "kinematics": _kinematics,
     "phantom": _phantom,
     "truth/SIZE": _truth,
+    "truth/volume": partial(_wall_labels, dims=3),
     "points": _points,
+    "points (volumes)": lambda arrays, _: _still_at_ed("true_displacement", arrays),
     "tracking/TRACKER": _tracking,
+    "tracking/TRACKER (volumes)": _quality,
 }
 """Kind of a group -> faults of its arrays in relation to each other."""

@@ -187,7 +187,8 @@ def _mechanics(config: Config, view: str, tracker: str) -> Settings:
 def _phantom(config: Config, view: str, tracker: str) -> Settings:
     """What the scatterers of a view depend on, and their echoes: the group `rf` has no settings of its own."""
     levels = config.realism.model_dump(mode="json", exclude={"preset"})
-    return config.seed, config.views[view], config.phantom, config.probe.resolved(), config.rf, levels, config.depth_mm
+    of_array = config.probe.resolved(), config.rf, levels, config.depth_mm
+    return (config.seed, config.views[view], config.phantom, *of_array, *_voxels(config))
 
 
 def _truth(config: Config, view: str, tracker: str) -> Settings:
@@ -197,7 +198,12 @@ def _truth(config: Config, view: str, tracker: str) -> Settings:
 
 def _image(config: Config) -> Settings:
     """Side of the images and their pixels; smaller images are made of the largest."""
-    return config.bmode.field_of_view_mm, config.bmode.size_px, config.bmode.sizes[0]
+    return (config.bmode.field_of_view_mm, config.bmode.size_px, config.bmode.sizes[0], *_voxels(config))
+
+
+def _voxels(config: Config) -> Settings:
+    """Voxels of views that are volumes."""
+    return (config.volume,) if config.has_volumes else ()
 
 
 def _neighbours(config: Config) -> Settings:

@@ -3,8 +3,10 @@
 import numpy as np
 
 from echotruth.config import Config
+from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.tracking.windows import grid
+from echotruth.units import mm
 
 
 def spacing_px(config: Config) -> int:
@@ -42,3 +44,28 @@ def grid_positions(config: Config) -> np.ndarray:
     axial, lateral = pixel_centres(config.bmode, config.bmode.sizes[0])
     rows, columns = grid_pixels(config)
     return np.stack([lateral[columns], axial[rows]], axis=-1)
+
+
+def grid_voxels(config: Config, spacing: float) -> np.ndarray:
+    """Voxels that are points of the grid in volumes.
+
+    Parameters
+    ----------
+    config : Config
+    spacing : float, m
+        Distance of the points, as nearly as voxels allow.
+
+    Returns
+    -------
+    ndarray of shape (point, 3)
+        Axial, elevation and lateral index.
+    """
+    steps = np.maximum(1, np.rint(spacing / (np.array(config.volume.voxel_mm) * mm))).astype(int)
+    along = (np.arange(step // 2, count, step) for step, count in zip(steps, config.volume.size, strict=True))
+    return np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def voxel_positions(config: Config, voxels: np.ndarray) -> np.ndarray:
+    """Positions (point, 3), m, of voxels, by indices as of :func:`grid_voxels`: lateral, axial, elevation."""
+    axial, elevation, lateral = (each[of] for each, of in zip(voxel_centres(config), voxels.T, strict=True))
+    return np.column_stack([lateral, axial, elevation])

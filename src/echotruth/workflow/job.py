@@ -151,7 +151,7 @@ class Job:
 
     def groups(self) -> list[str]:
         """Groups that this job writes: those of which Snakemake knows."""
-        return groups_of(self.stage, self.config.bmode.sizes, self.tracker)
+        return groups_of(self.stage, self.config.image_names, self.tracker)
 
     def write(self, result: Result) -> None:
         """Write the groups of a result, each as a whole."""

@@ -17,7 +17,7 @@ from uuid import uuid4
 import yaml
 
 from echotruth import files
-from echotruth.cases import Case, all_cases, repository_cases
+from echotruth.cases import Case, all_cases, expand
 from echotruth.config import Config
 from echotruth.config.diagnosis import bounds_of
 from echotruth.config.loading import ConfigError, validate
@@ -77,7 +77,7 @@ class Plan:
         self.config: Config = with_added_trackers(config, self.folder)
         # The files of a repository that stands were checked when it was made.
         self.cases: dict[str, Case] = (
-            all_cases(self.config) if folder else {case.id: case for case in repository_cases(self.config, source)}
+            all_cases(self.config) if folder else {case.id: case for case in expand(self.config, source)}
         )
         self._versions: dict[str, Versions] = {}
         self._attributes: dict[str, dict[str, Any]] = {}
@@ -187,7 +187,7 @@ class Plan:
     def _groups(self, job: JobPlace) -> list[str]:
         """Paths of the groups of a job below the store."""
         case = self.cases[job.case]
-        groups = groups_of(job.stage, case.config.bmode.sizes, job.tracker)
+        groups = groups_of(job.stage, case.config.image_names, job.tracker)
         return [place(group, case.heart, job.case, job.view) for group in groups]
 
     def _version(self, job: JobPlace) -> str:

@@ -61,7 +61,7 @@ def _done(repository: Repository, store: Path, stage: str) -> tuple[int, int]:
     """Number of the groups of a stage that are made, and of all."""
     views = [None] if stage in OF_HEART else repository.views
     trackers = repository.trackers if stage == "tracking" else [""]
-    groups = [group for tracker in trackers for group in groups_of(stage, repository.sizes, tracker)]
+    groups = [group for tracker in trackers for group in groups_of(stage, repository.config.image_names, tracker)]
     places = {repository.path(*one) for one in product(groups, repository.present, views)}
     return sum((store / place / METADATA).is_file() for place in places), len(places)
 
