@@ -1,6 +1,7 @@
 """The report: figures of the repository, and the page that shows them."""
 
-FIGURES = ["loop", "strain", "physiology", "curves", "segments", "bullseye", "error", "leaderboard", "heart", "views"]
+FIGURES = ["loop", "strain", "physiology", "leaderboard", "heart"]
+FIGURES += [] if PLAN.config.has_volumes else ["curves", "segments", "bullseye", "error", "views"]
 FIGURES += ["population"] if len(PLAN.cases) > 1 else []
 FIGURES += ["inference"] if PLAN.config.inference.tracker else []
 

@@ -110,7 +110,7 @@ def test_run_on_two_cores_makes_the_bytes_of_jobs_in_one_process_and_a_report(tm
     workspace.echotruth("run", "tiny.yaml", "--cores", "2")
     assert content(workspace.out) == content(finish(tmp_path / "tiny", et.configure(yaml.safe_load(CONFIG)), solved))
     page = (workspace.out / "report.html").read_text()
-    assert "NaN" not in page and '"sheet": "data:image/jpeg' in page
+    assert page.count('src="data:image/svg') == 5 and '"sheet": "data:image/jpeg' in page
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.repository.choice import Names, image_size, require_known
+from echotruth.repository.choice import Names, image_size, require_known, require_slices
 from echotruth.repository.reader import Repository
 from echotruth.units import mm
 
@@ -58,6 +58,7 @@ class Items(Sequence[Item]):
     def __init__(self, repository: str | Path, cases: Any = None, views: Names = None, size: int | None = None) -> None:
         self.repository = Repository(repository)
         config = self.repository.config
+        require_slices(config, type(self).__name__)
         self.size = image_size(config, size)
         self.frames = config.loop.frames
         self.spacing = config.bmode.field_of_view_mm * mm / self.size

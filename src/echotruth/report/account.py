@@ -76,7 +76,8 @@ def _inferred(case: str, rows: pd.DataFrame) -> dict[str, Any]:
 
 def _not_estimated(repository: Repository) -> Iterator[dict[str, str]]:
     """What trackers have no estimate of in the first heart that is shown, with the reason; failures are apart."""
-    table = repository.summary(cases=repository.shown[:1]) if repository.shown else None
+    has_curves = repository.shown and not repository.config.has_volumes
+    table = repository.summary(cases=repository.shown[:1]) if has_curves else None
     if table is None or not len(table):
         return
     lost = table[(table["no_estimate"] != "") & (table["view"] != ALL_VIEWS)]

@@ -146,16 +146,23 @@ def _sheets(
     left, right, lower, upper = crop(clip)
     column, row, extent = int(np.floor(left)), int(np.floor(upper)), int(np.ceil(max(right - left, lower - upper)))
     tissue = clip.image[:, row : row + extent + 1, column : column + extent + 1]
-    colour = _entries(strain[:, row : row + extent + 1, column : column + extent + 1])
+    colour = entries(strain[:, row : row + extent + 1, column : column + extent + 1])
     largest = max(tissue.shape[1:])
     factor = min(MAX_SIDE, int((MAX_PIXELS / (count * len(tissue))) ** 0.5), largest) / largest
     size = tuple(round(side * factor) for side in tissue.shape[:0:-1])
-    sheets = {
-        "sheet": address(_pasted(tissue, size, Image.Resampling.LANCZOS), "jpeg", quality=QUALITY, optimize=True),
-        "colours": address(_coloured(_pasted(colour, size, Image.Resampling.NEAREST)), "png", optimize=True),
+    return sheets(tissue, colour, size), np.array([column, row]) - 0.5, factor
+
+
+def sheets(image: NDArray[np.uint8], colour: NDArray[np.uint8], size: tuple[int, ...]) -> dict[str, Any]:
+    """All frames (frame, axial, lateral) in one picture, row by row, the :func:`entries` of their strain in another.
+
+    With them are the size of a frame in the pictures, width and height in px, and the number of frames.
+    """
+    return {
+        "sheet": address(_pasted(image, size, Image.Resampling.LANCZOS), "jpeg", quality=QUALITY, optimize=True),
+        "colours": address(coloured(_pasted(colour, size, Image.Resampling.NEAREST)), "png", optimize=True),
+        **{"width": size[0], "height": size[1], "columns": COLUMNS, "frames": len(image)},
     }
-    numbers = {"width": size[0], "height": size[1], "columns": COLUMNS, "frames": len(tissue)}
-    return sheets | numbers, np.array([column, row]) - 0.5, factor
 
 
 def _pasted(frames: NDArray[np.uint8], size: tuple[int, ...], filter_: Image.Resampling) -> Image.Image:
@@ -168,14 +175,14 @@ def _pasted(frames: NDArray[np.uint8], size: tuple[int, ...], filter_: Image.Res
     return sheet
 
 
-def _entries(strain: NDArray[np.float32]) -> NDArray[np.uint8]:
+def entries(strain: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Steps of the scale of strain, from 1; 0 where there is none."""
     place = (style.FACTORS["%"] * strain / style.STRAIN_LIMIT + 1) / 2 * (SHADES - 1)
     return np.where(np.isfinite(place), 1 + np.rint(np.clip(np.nan_to_num(place), 0, SHADES - 1)), 0).astype(np.uint8)
 
 
-def _coloured(entries: Image.Image) -> Image.Image:
-    """A picture of :func:`_entries` in the colours of strain, transparent where there is none."""
+def coloured(entries: Image.Image) -> Image.Image:
+    """A picture of :func:`entries` in the colours of strain, transparent where there is none."""
     table = np.vstack([np.zeros(3), colormaps[style.SIGNED](np.linspace(0, 1, SHADES))[:, :3]])
     picture = entries.copy()
     picture.putpalette(np.rint(255 * table).astype(np.uint8).tobytes())

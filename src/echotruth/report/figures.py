@@ -32,6 +32,7 @@ from echotruth.report import (
     strain,
     style,
     views,
+    volume,
 )
 from echotruth.report.clips import ARROW_SPACING, with_motion
 from echotruth.report.comparison import Comparison
@@ -48,6 +49,9 @@ OF_HEARTS = ("clip", "loop", "strain", "physiology", "heart", "views")
 
 OF_TRACKERS = ("curves", "segments", "bullseye", "error", "leaderboard")
 """Figures of what trackers found."""
+
+OF_SLICES = ("views", "curves", "segments", "bullseye", "error")
+"""Figures that volumes have not."""
 
 HEIGHT, FRAME_RATE, BEATS = 720, 20, 3
 """Of the clip: its height, px, frames per second, which is slow motion, and repetitions."""
@@ -101,6 +105,8 @@ class Figures:
 
     def _save(self, names: Iterable[str]) -> None:
         for name in names:
+            if self.config.has_volumes and name in OF_SLICES:
+                continue
             figure = getattr(self, name)() if self.case else style.sentence(NONE_COMPLETE)
             if figure is not None:
                 style.save(figure, self.folder / name)
@@ -168,7 +174,9 @@ class Figures:
         video.write(self.folder / "clip.mp4", np.concatenate([frames] * BEATS), FRAME_RATE, quality=20)
 
     def frames(self, height: int) -> NDArray[np.uint8]:
-        """Frames of the clip beside its truth, of a height, px."""
+        """Frames of the clip beside its truth, of a height, px; of volumes as wide as it would be."""
+        if self.config.has_volumes:
+            return volume.film(self.repository.clip(self.case, self.view), self.shown, round(height * clip.WIDTH))
         size, plane = self.sizes[0], self.config.views[self.view].plane
         moving, _ = with_motion(self.repository, self.case, self.view, size)
         chosen = clip.thin(moving.position, ARROW_SPACING * size)

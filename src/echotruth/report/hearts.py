@@ -39,16 +39,14 @@ def measures(repository: Repository, cases: Sequence[str]) -> dict[str, NDArray[
     return {label: factor * np.array([each[name] for each in found]) for label, (name, factor) in MEASURES.items()}
 
 
-def subjects(repository: Repository, view: str, size: int) -> list[dict[str, Any]]:
+def subjects(repository: Repository, view: str) -> list[dict[str, Any]]:
     """The hearts that the page shows, evenly chosen if there are many.
 
     Parameters
     ----------
     repository : Repository
     view : str
-        View of the small pictures.
-    size : int
-        Size of the images from which these are made, px.
+        View of the small pictures, which are made of its smallest images.
 
     Returns
     -------
@@ -67,10 +65,21 @@ def subjects(repository: Repository, view: str, size: int) -> list[dict[str, Any
             "diagnosis": str(repository.cases.at[case, "diagnosis"]),
             "volume": float(repository.read("mechanics/volume", case, None, 0)),
             "measures": [float(values[k]) for values in found.values()],
-            "picture": picture(repository.read(f"bmode/{size}/image", case, view, 0)),
+            "picture": picture(_image(repository, case, view)),
         }
         for k, case in enumerate(chosen)
     ]
+
+
+def _image(repository: Repository, case: str, view: str) -> NDArray[np.uint8]:
+    """The smallest image at end-diastole, of volumes the slice through the middle, its pixels square."""
+    config = repository.config
+    image = repository.read(f"bmode/{config.image_names[-1]}/image", case, view, 0)
+    if not config.has_volumes:
+        return image
+    axial, _, lateral = config.volume.field_mm
+    middle = Image.fromarray(image[:, image.shape[1] // 2])
+    return np.asarray(middle.resize((max(1, round(len(image) * lateral / axial)), len(image))))
 
 
 def picture(image: NDArray[np.uint8]) -> str:

@@ -15,8 +15,11 @@ PANELS = (
     ("e_cc_rms_pp", "RMS error of circumferential\nstrain at ES (percentage points)"),
     ("e_ll_rms_pp", "RMS error of longitudinal\nstrain at ES (percentage points)"),
     ("e_rr_rms_pp", "RMS error of radial strain\nat ES (percentage points)"),
+    ("segment_e_cc_rms_pp", "RMS error of circumferential strain\nof segments at ES (pp)"),
+    ("segment_e_ll_rms_pp", "RMS error of longitudinal strain\nof segments at ES (pp)"),
+    ("segment_e_rr_rms_pp", "RMS error of radial strain\nof segments at ES (pp)"),
 )
-"""Metrics that are drawn, and their labels."""
+"""Metrics that are drawn, and their labels; the last are those of volumes."""
 
 
 @style.styled
@@ -26,7 +29,7 @@ def draw(standings: pd.DataFrame, order: list[str]) -> Figure:
     The standings are what :func:`echotruth.evaluation.leaderboard.standings` returns.
     """
     # With a grid too coarse for strain, or no short-axis view, a metric has no values.
-    shown = [panel for panel in PANELS if standings[panel[0]].notna().any()] or PANELS[:1]
+    shown = [panel for panel in PANELS if panel[0] in standings and standings[panel[0]].notna().any()] or PANELS[:1]
     figure = style.figure(1.9 + 2.1 * len(shown), 1.5 + 0.52 * len(order))
     panels = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     sizes = sorted(standings["size_px"].unique(), reverse=True)[: len(SIZES)]
@@ -70,7 +73,8 @@ def _label(standings: pd.DataFrame, tracker: str) -> str:
 
 
 def _legend(figure: Figure, standings: pd.DataFrame, columns: int) -> None:
-    marks = style.size_handles(sorted(standings["size_px"].unique(), reverse=True))
+    sizes = sorted(standings["size_px"].unique(), reverse=True)
+    marks = style.size_handles(sizes) if len(sizes) > 1 else []
     ring = Line2D([], [], color=style.MUTED, marker="o", ls="none", markersize=3, fillstyle="none", label="one view")
     hearts = int(np.nanmax(standings["hearts"]))
     text = "mean over the views" if hearts < 2 else f"mean of {hearts} hearts and its 95 % interval"

@@ -15,7 +15,7 @@ from echotruth import files
 from echotruth.cases import diagnosis
 from echotruth.config import shipped
 from echotruth.evaluation.leaderboard import best
-from echotruth.report import account, board, style
+from echotruth.report import account, board, style, volume
 from echotruth.report.clips import clips
 from echotruth.report.comparison import Comparison
 from echotruth.report.hearts import MEASURES, subjects
@@ -55,10 +55,11 @@ def _context(repository: Repository) -> dict[str, Any]:
     infers = bool(case and config.inference.tracker)
     standings = pd.read_csv(folder / "figures/leaderboard.csv") if case else None
     order = [name for name in best(standings) if name in repository.trackers] if standings is not None else []
-    comparison = Comparison(repository, repository.case(case), tuple(order)) if case else None
-    tracker = comparison.trackers[0] if comparison else ""
+    has_curves = case and not config.has_volumes
+    comparison = Comparison(repository, repository.case(case), tuple(order)) if has_curves else None
+    tracker = comparison.trackers[0] if comparison else next(iter(order), "")
     number = repository.trackers.index(tracker) if tracker else 0
-    hearts = subjects(repository, view, config.bmode.sizes[-1]) if shown else []
+    hearts = subjects(repository, view) if shown else []
     return {
         "config": config,
         "version": report_version(folder),
@@ -71,14 +72,14 @@ def _context(repository: Repository) -> dict[str, Any]:
         "imaged": account.imaged(repository),
         "present": len(repository.present),
         "bytes": account.size_on_disk(folder / f"{config.name}.zarr"),
-        "board": board.of(standings, config.bmode.sizes[0], len(shown)) if standings is not None else None,
+        "board": board.of(standings, config.image_sizes[0], len(shown)) if standings is not None else None,
         "shown": shown,
         "best": tracker,
         "main_view": view,
         "strain_limit": style.STRAIN_LIMIT,
         "opacity": style.OPACITY,
         "strain_colours": [to_hex(colour) for colour in colormaps[style.SIGNED](np.linspace(0, 1, 17))],
-        "clips": clips(comparison) if comparison else None,
+        "clips": clips(comparison) if comparison else volume.clips(repository, view) if case else None,
         "tally": {name: cases[name].value_counts().sort_index().to_dict() for name in ("status", "diagnosis")},
         "measures": list(MEASURES),
         "hearts": hearts,

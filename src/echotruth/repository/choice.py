@@ -51,6 +51,13 @@ def image_size(config: Config, size: int | None) -> int:
     return config.image_sizes[0] if size is None else require_known("size", size, config.image_sizes)
 
 
+def require_slices(config: Config, what: str) -> None:
+    """Refuse a repository of volumes where only slices will do; ValueError says what reads them."""
+    if config.has_volumes:
+        remedy = "read these by clip, heart and scores of echotruth.Repository (docs/volumes.md)"
+        raise ValueError(f"{what}: needs slices, and {config.name} has volumes: {remedy}.")
+
+
 def main_view(config: Config) -> str:
     """The view that is shown where only one can be: the mid one, or the first."""
     return "mid" if "mid" in config.views else next(iter(config.views))

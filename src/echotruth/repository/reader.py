@@ -18,7 +18,7 @@ from echotruth.config.loading import load, validate
 from echotruth.heart import Heart
 from echotruth.imaging.view import Plane, before_probe, imaging_plane
 from echotruth.repository import group, metadata, schema, status
-from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known
+from echotruth.repository.choice import Names, Sizes, chosen, image_size, main_view, require_known, require_slices
 from echotruth.repository.group import NotWritten
 from echotruth.repository.places import OF_HEART, groups_of, place, repository_folder
 from echotruth.repository.remote import Remote, hierarchy, is_url
@@ -88,7 +88,7 @@ class Repository:
         lines = {
             "hearts": count,
             "views": views,
-            "sizes": f"{', '.join(map(str, self.sizes))} px",
+            "sizes": self._sizes,
             "trackers": ", ".join(self.trackers),
             "frames": str(self.config.loop.frames),
             "path": self.location,
@@ -197,6 +197,12 @@ class Repository:
     def sizes(self) -> list[int]:
         """Pixels along a side of the images, the largest first; of volumes the most voxels along a side."""
         return list(self.config.image_sizes)
+
+    @property
+    def _sizes(self) -> str:
+        if self.config.has_volumes:
+            return f"{' x '.join(map(str, self.config.volume.size))} voxels (axial, elevation, lateral)"
+        return f"{', '.join(map(str, self.sizes))} px"
 
     @property
     def trackers(self) -> list[str]:
@@ -336,6 +342,7 @@ class Repository:
         """
         from echotruth.evaluation.tracks import tracks
 
+        require_slices(self.config, "tracks")
         return tracks(self, self.case(case).id, self.view(view), image_size(self.config, size), trackers)
 
     def curves(
@@ -386,6 +393,7 @@ class Repository:
         """
         from echotruth.evaluation.curves import strain_curves
 
+        require_slices(self.config, "curves")
         return strain_curves(self, self.case(case).id, self.view(view), tracker or self._tracker, size, reference)
 
     def twist(self, case: str | None = None, tracker: str | None = None, size: int | None = None) -> xr.Dataset:
@@ -418,6 +426,7 @@ class Repository:
         """
         from echotruth.evaluation.curves import twist_curves
 
+        require_slices(self.config, "twist")
         return twist_curves(self, self.case(case).id, tracker or self._tracker, size)
 
     @property
@@ -462,6 +471,7 @@ class Repository:
         """
         from echotruth.evaluation.summary import strain_summary
 
+        require_slices(self.config, "summary")
         return strain_summary(self, cases, views, sizes, trackers)
 
     def metrics(
@@ -492,6 +502,7 @@ class Repository:
         """
         from echotruth.evaluation.clip_metrics import clip_metrics
 
+        require_slices(self.config, "metrics")
         return clip_metrics(self, cases, views, sizes, trackers)
 
     @cached_property

@@ -14,6 +14,7 @@ from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
 
 from echotruth.config.loading import ConfigError
+from echotruth.repository.choice import require_slices
 from echotruth.repository.reader import Repository
 from echotruth.viewer.access import Access
 from echotruth.viewer.choice import asked
@@ -92,6 +93,7 @@ def opened(repository: str | Path) -> Repository:
         raise ShowError(f"{repository}: cannot be read ({said}): run echotruth check {repository}") from error
     if is_empty:
         raise ShowError(f"{repository}: has no cases: run its configuration, which writes them into cases.csv")
+    require_slices(found.config, "the viewer")
     return found
 
 

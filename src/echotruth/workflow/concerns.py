@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from echotruth.config import Config
+from echotruth.config.tracking import VOLUMETRIC
 from echotruth.evaluation.no_estimate import coarse_grid
 
 MAX_PIXEL_WAVELENGTHS = 2.0
@@ -20,7 +21,7 @@ class Concern(NamedTuple):
 
 def concerns(config: Config) -> Iterator[Concern]:
     """What speaks against a run."""
-    yield from _of_the_images(config)
+    yield from (_of_the_volumes if config.has_volumes else _of_the_images)(config)
     yield from _of_the_file(config)
 
 
@@ -39,6 +40,13 @@ def _of_the_images(config: Config) -> Iterator[Concern]:
         yield Concern(f"bmode.size_px = {config.bmode.size_px}: {text}: {remedy}", False)
     if text := coarse_grid(config):
         yield Concern(text, False)
+
+
+def _of_the_volumes(config: Config) -> Iterator[Concern]:
+    for name, tracker in config.tracking.trackers.items():
+        if not isinstance(tracker, VOLUMETRIC):
+            remedy = "use bspline_dic, or a function or program"
+            yield Concern(f"tracking.trackers.{name}.method tracks slices, and the views are volumes: {remedy}", True)
 
 
 def _of_the_file(config: Config) -> Iterator[Concern]:

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Literal
 
 from echotruth.config import shipped
-from echotruth.repository.choice import chosen
+from echotruth.repository.choice import chosen, require_slices
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.destination import draft
@@ -116,6 +116,8 @@ class Export:
     output: Path | None = None
 
     def __post_init__(self) -> None:
+        if FORMATS[self.format].holds != "heart":
+            require_slices(self.repository.config, f"--format {self.format}")
         for name in ("overlay", "rate", "views", "sizes", "trackers"):
             if getattr(self, name) and not FORMATS[self.format].takes(name):
                 able = ", ".join(key for key, form in FORMATS.items() if form.takes(name))

@@ -13,9 +13,11 @@ from echotruth.repository.reader import Repository
 from echotruth.repository.status import ALWAYS, is_label
 from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.release.attribution import Attribution, Author
+from echotruth.units import mm
 
 CLIPS = "clips.csv"
-"""Name of the table of clips: case, view, size, frames, time and pixel in SI, and path of the images in the store."""
+"""Name of the table of clips: case, view, size, frames, time and pixel in SI, and path of the images in the store. A
+voxel has three sides: axial, elevation, lateral."""
 
 
 class ReleaseError(ValueError):
@@ -80,12 +82,15 @@ def read_facts(repository: Repository, given: Attribution) -> Facts:
 
 
 def _row(clip: ExportedClip) -> dict[str, Any]:
+    config = clip.case.config
+    name = "volume" if config.has_volumes else str(clip.size)
+    sides = config.volume.voxel_mm if config.has_volumes else (config.bmode.field_of_view_mm / clip.size,)
     return {
         "case": clip.case.id,
         "view": clip.view,
         "size_px": clip.size,
         "frames": len(clip.time),
         "frame_time_s": f"{clip.frame_time:.9g}",
-        "pixel_m": f"{clip.spacing:.9g}",
-        "array": clip.repository.path(f"bmode/{clip.size}/image", clip.case.id, clip.view),
+        "pixel_m": " ".join(f"{side * mm:.9g}" for side in sides),
+        "array": clip.repository.path(f"bmode/{name}/image", clip.case.id, clip.view),
     }
