@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 import echotruth as et
 from echotruth.report import style
 from echotruth.report.clip import webp
+from echotruth.report.volume import Slice, slices
 
 TARGET = Path(__file__).parents[1] / "docs/gallery/volume.webp"
 SETTINGS: dict[str, Any] = {
@@ -27,34 +27,24 @@ SETTINGS: dict[str, Any] = {
     "realism": {"preset": "mouse", "ring_down": {"level_dB": None}},
     "bmode": {"dropout": {"loss_dB": 0.0, "edge_loss_dB": 0.0}, "gain_dB": 6.0},
 }
-SLICES = {"short axis": ("axial", "lateral"), "long axis, along the beam": ("axial", "elevation")}
-SLICES["long axis, across the beam"] = ("elevation", "lateral")
-"""Title -> the dimensions of the picture, downwards and to the right."""
-STRAIN = {"short axis": "CC"}
 LIMIT = 0.25
 
 
-def pictures(clip: xr.Dataset, heart: Any) -> list[NDArray[np.uint8]]:
+def pictures(parts: list[Slice]) -> list[NDArray[np.uint8]]:
     """Every frame: above the volume, below it the strain since end-diastole."""
-    found = []
-    middle = {name: clip.sizes[name] // 2 for name in ("axial", "elevation", "lateral")}
-    sides = {name: 1e3 * float(np.ptp(clip[name].values)) for name in middle}
-    widths = [sides[across] for _, across in SLICES.values()]
-    for frame in range(clip.sizes["frame"]):
-        truth = et.voxel_truth(clip, heart, frame)
-        figure = Figure((sum(widths) / 2.4, 2 * sides["elevation"] / 2.4 + 0.5), dpi=72, facecolor="black")
+    found, widths = [], [1e3 * part.sides[1] for part in parts]
+    height = 1e3 * max(part.sides[0] for part in parts)
+    for frame in range(len(parts[0].image)):
+        figure = Figure((sum(widths) / 2.4, 2 * height / 2.4 + 0.5), dpi=72, facecolor="black")
         axes = figure.subplots(2, 3, width_ratios=widths)
-        for column, (title, dims) in enumerate(SLICES.items()):
-            at = {name: index for name, index in middle.items() if name not in dims}
-            image = clip["image"].isel(frame=frame, **at).transpose(*dims).values
-            along = STRAIN.get(title, "LL")
-            strain = truth["strain"].sel(strain_component=along).isel(at).transpose(*dims).values
-            extent = (0, sides[dims[1]], sides[dims[0]], 0)
-            for row, axis in enumerate(axes[:, column]):
-                axis.imshow(image, cmap="gray", vmin=0, vmax=255, extent=extent)
+        for part, column in zip(parts, axes.T, strict=True):
+            extent = (0, part.sides[1], part.sides[0], 0)
+            for row, axis in enumerate(column):
+                axis.imshow(part.image[frame], cmap="gray", vmin=0, vmax=255, extent=extent)
                 if row:
+                    strain = part.strain[frame]
                     axis.imshow(strain, cmap=style.SIGNED, vmin=-LIMIT, vmax=LIMIT, extent=extent, alpha=0.7)
-                axis.set_title(f"{title}: {along}" if row else title, color="white", fontsize=9)
+                axis.set_title(f"{part.name}: {part.component}" if row else part.name, color="white", fontsize=9)
                 axis.axis("off")
         figure.tight_layout(pad=0.4)
         canvas = FigureCanvasAgg(figure)
@@ -65,7 +55,7 @@ def pictures(clip: xr.Dataset, heart: Any) -> list[NDArray[np.uint8]]:
 
 def main() -> None:
     heart = et.beat(et.configure(**SETTINGS))
-    webp(TARGET, np.stack(pictures(et.image(heart, "whole"), heart)))
+    webp(TARGET, np.stack(pictures(list(slices(et.image(heart, "whole"), heart)))))
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ out/NAME/NAME.zarr/
     mechanics/                pressure, volume, tension, displacement      mechanics
     kinematics/               strain                                       mechanics
     physiology/               measures, such as twist and GLS              mechanics
-  clips/CASE/VIEW/          a case seen in a view
+  clips/CASE/VIEW/          a case seen in a view, a slice or volumes
     phantom/                  plane, scatterers                            phantom
     rf/                       lines; channels if rf.keep has them          rf
     truth/SIZE/               motion, strain and labels of every pixel     truth
@@ -59,8 +59,9 @@ out/NAME/NAME.zarr/
 ```
 
 `HEART` and `CASE` are ids of `cases.csv`; `VIEW`, `SIZE` (512, 256, 128 px) and `TRACKER` are those of the
-configuration. Cases that differ only in speckle, array or image have one heart. `xarray.open_datatree` opens all of it,
-and `xarray.open_zarr` a heart, a clip or a group; `echotruth.Repository` reads it by case, view and size.
+configuration. Of volumes `SIZE` is `volume`, and `rf`, `points` and `tracking/TRACKER` have other arrays. Cases that
+differ only in speckle, array or image have one heart. `xarray.open_datatree` opens all of it, and `xarray.open_zarr` a
+heart, a clip or a group; `echotruth.Repository` reads it by case, view and size.
 
 Files beside it, in `out/NAME`: `config.yaml`, `cases.csv` (the cases with status, heart, labels and all keys),
 `cases/CASE.json` (the configuration of each), `SHA256SUMS` (checksum of every file), `report.html` and `figures/`,
@@ -78,8 +79,8 @@ Files beside it, in `out/NAME`: `config.yaml`, `cases.csv` (the cases with statu
   cycle) with a crc32c checksum. Small arrays are one chunk. Numbers are compressed by Blosc (zstd, bytes shuffled).
 - **Missing values** are `nan`, 0 or "": outside the wall, and where a tracker has no estimate.
 - **Steps.** Arrays with a step hold ordinary numbers rounded to multiples of it, the attribute `quantum` in the unit of
-  the array. `pixel/256` is the largest power of two, in metres, not above 1/256 pixel of the largest image. Scores are
-  computed from the rounded numbers.
+  the array. `pixel/256` is the largest power of two, in metres, not above 1/256 pixel of the largest image, or of the
+  shortest side of a voxel. Scores are computed from the rounded numbers.
 
 Axes, signs and reference states are in `conventions.md`.
 

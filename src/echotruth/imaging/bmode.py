@@ -176,9 +176,14 @@ def log_compress(images: np.ndarray, dynamic_range_dB: float, gain_dB: float = 0
     reference = images.max()
     if not reference > 0 or not np.isfinite(reference):
         raise ValueError("The clip holds no echo: its envelope is zero or not finite.")
-    floor = 10 ** (-dynamic_range_dB / 20)
-    relative = np.clip(images / reference * 10 ** (gain_dB / 20), floor, 1)
-    return np.maximum(1 + 20 * np.log10(relative) / dynamic_range_dB, 0)
+    levels = images / reference
+    levels *= 10 ** (gain_dB / 20)
+    # In place, because memory is what this takes.
+    np.log10(np.clip(levels, 10 ** (-dynamic_range_dB / 20), 1, out=levels), out=levels)
+    levels *= 20
+    levels /= dynamic_range_dB
+    levels += 1
+    return np.maximum(levels, 0, out=levels)
 
 
 def persist(levels: np.ndarray, weight: float, is_closed: bool = True) -> np.ndarray:
@@ -384,7 +389,7 @@ def grey_images(images: np.ndarray, inside: np.ndarray, bmode: Bmode, is_closed:
         levels = persist(levels, bmode.persistence, is_closed)
     if bmode.smoothing or bmode.edge_enhancement:
         levels = np.stack([_filtered(level, inside, bmode) for level in levels])
-    return eight_bit(levels, bmode)
+    return np.stack([eight_bit(level, bmode) for level in levels])
 
 
 def _filtered(level: np.ndarray, inside: np.ndarray, bmode: Bmode) -> np.ndarray:

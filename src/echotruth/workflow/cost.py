@@ -1,6 +1,6 @@
 """CPU time and memory that a job is expected to take: those of the default heart, times what scales them."""
 
-from math import ceil
+from math import ceil, prod
 
 from echotruth.config import Config
 
@@ -10,6 +10,8 @@ SECONDS = {
 }
 """CPU time of a job of each rule for the default heart (40 frames, 512 px), s, on a core of an AMD EPYC (Zen 4); of
 tracking, that of a tracker in three sizes."""
+SECONDS_OF_VOLUMES = SECONDS | {"phantom": 4, "rf": 363, "truth": 16, "bmode": 14, "points": 4, "tracking": 242}
+"""Likewise of the default heart in 40 volumes of 144 x 128 x 96 voxels, without blood and surroundings."""
 MEGABYTES = {
     **{
         "mechanics": 900,
@@ -24,12 +26,16 @@ MEGABYTES = {
     **{"repository": 600, "report": 1200},
 }
 """Memory of a job of each rule for the default heart, MB."""
-FRAMES, PIXELS, CELLS = 40, 512**2, 4320
-"""Frames, pixels and tetrahedra of the default heart."""
+MEGABYTES_OF_VOLUMES = MEGABYTES | {"rf": 800, "truth": 1100, "bmode": 1500, "tracking": 2000}
+"""Likewise in volumes."""
+FRAMES, PIXELS, CELLS, VOXELS = 40, 512**2, 4320, 144 * 128 * 96
+"""Frames, pixels and tetrahedra of the default heart, and voxels of a volume."""
 FILE_CELLS = 60_000
 """Tetrahedra assumed in a mesh from a file, whose size is not known before it is read."""
 MEGABYTES_OF_FRAME = 1.2
 """Size on disk of a frame of a view of the default heart, in three sizes, MB, with its lines and six trackers."""
+MEGABYTES_OF_VOLUME = 7.2
+"""Likewise of a volume of 144 x 128 x 96 voxels and one tracker."""
 FILES_OF_HEART, FILES_OF_VIEW, FILES_OF_SIZE, FILES_OF_TRACKER = 205, 105, 40, 41
 """Files of a heart, of a view, and of a view more for each image size and for each tracker (docs/size.md)."""
 
@@ -37,29 +43,38 @@ FILES_OF_HEART, FILES_OF_VIEW, FILES_OF_SIZE, FILES_OF_TRACKER = 205, 105, 40, 4
 def scale(rule: str, config: Config) -> float:
     """Work of a job over that for the default heart."""
     geometry, frames = config.geometry, config.loop.frames / FRAMES
-    pixels = max(config.bmode.sizes) ** 2 / PIXELS
+    pixels = _pixels(config)
     if rule == "mechanics":
         elements = geometry.circumferential_elements * geometry.longitudinal_elements * geometry.transmural_elements
         cells = FILE_CELLS if geometry.file and not geometry.remesh else 5 * elements
         beats = 4 if config.loop.kind == "circulation" else 1
         return beats * (cells / CELLS) ** 1.3 * (0.4 + 0.6 * frames)
     if rule in ("phantom", "rf"):
-        return frames * config.probe.elements / 64 * (2 if config.realism.surroundings.level_dB is not None else 1)
+        of_array = pixels if config.has_volumes else config.probe.elements / 64
+        return frames * of_array * (2 if config.realism.surroundings.level_dB is not None else 1)
     if rule in ("truth", "bmode"):
+        return frames * pixels
+    if rule == "tracking" and config.has_volumes:
         return frames * pixels
     if rule == "tracking":
         return frames * sum(0.1 + 0.9 * size**2 / PIXELS for size in config.bmode.sizes) / 1.5
     return frames if rule == "points" else 1.0
 
 
+def _pixels(config: Config) -> float:
+    """Pixels of the largest image, or voxels of a volume, over those of the default heart."""
+    return prod(config.volume.size) / VOXELS if config.has_volumes else max(config.bmode.sizes) ** 2 / PIXELS
+
+
 def seconds(rule: str, config: Config) -> float:
     """CPU time of a job, s."""
-    return 1.0 + SECONDS[rule] * scale(rule, config)
+    return 1.0 + (SECONDS_OF_VOLUMES if config.has_volumes else SECONDS)[rule] * scale(rule, config)
 
 
 def megabytes(rule: str, config: Config) -> float:
     """Peak memory of a job, MB."""
-    return MEGABYTES[rule] * max(0.5, scale(rule, config)) ** 0.7
+    of_default = (MEGABYTES_OF_VOLUMES if config.has_volumes else MEGABYTES)[rule]
+    return of_default * max(0.5, scale(rule, config)) ** 0.7
 
 
 def resources(rule: str, config: Config) -> dict[str, int]:
@@ -104,9 +119,10 @@ def table(config: Config, hearts: int, cases: int, cores: int) -> str:
         lines.append(f"{rule:13} {number:>7} {duration(took):>9}")
         total += took
     views = cases * len(config.views)
-    size_MB = views * config.loop.frames * MEGABYTES_OF_FRAME * max(config.bmode.sizes) ** 2 / PIXELS
+    size_MB = views * config.loop.frames * _pixels(config)
+    size_MB *= MEGABYTES_OF_VOLUME if config.has_volumes else MEGABYTES_OF_FRAME
     disk = f"{size_MB / 1e3:.1f} GB" if size_MB >= 1e3 else f"{size_MB:.0f} MB"
-    of_view = FILES_OF_VIEW + FILES_OF_SIZE * len(config.bmode.sizes) + FILES_OF_TRACKER * len(config.tracking.trackers)
+    of_view = FILES_OF_VIEW + FILES_OF_SIZE * len(config.image_names) + FILES_OF_TRACKER * len(config.tracking.trackers)
     number = hearts * FILES_OF_HEART + views * of_view
     took = max(total / cores, chain(config))
     lines += ["", f"Time: {duration(total)} of CPU time, about {duration(took)} on {cores} cores"]
