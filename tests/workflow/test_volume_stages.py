@@ -10,10 +10,14 @@ from workspace import Workspace
 import echotruth as et
 from echotruth.cases import expand
 from echotruth.config.loading import ConfigError
+from echotruth.learning import Segmentation
 from echotruth.repository import schema
 from echotruth.repository.check import check
 from echotruth.repository.group import part
 from echotruth.repository.places import group_of
+from echotruth.sharing.export import Export
+from echotruth.viewer.server import opened
+from echotruth.workflow.concerns import concerns
 
 CONFIG = """
 name: tiny
@@ -22,9 +26,8 @@ loop: {frames: 3}
 motion: {kind: rigid, rigid: {lateral_um: 200, axial_um: -300, elevation_um: 250}}
 views: {whole: {plane: volume}}
 phantom: {density_per_mm3: 20}
-probe: {preset: mouse_row_column_15MHz, elements: 24, pitch_um: 290}
-volume: {size: [24, 20, 18], field_mm: [6.9, 6.9, 6.9]}
-tracking: {trackers: {a: {method: bspline_dic}}}
+probe: {preset: mouse_row_column_15MHz, elements: 24, pitch_um: 360}
+volume: {size: [24, 24, 18], field_mm: [6.9, 8.6, 6.9]}
 """
 
 
@@ -40,7 +43,7 @@ def failing(frames, points, mask, spacing, frame_time, seed):
 
 def configured(*trackers, **keys):
     names = {name: {"method": "external", "track": f"{__name__}:{name}"} for name in trackers}
-    return et.configure(yaml.safe_load(CONFIG), tracking={"trackers": names}, **keys)
+    return et.configure(yaml.safe_load(CONFIG), **({"tracking": {"trackers": names}} if names else {}), **keys)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +100,7 @@ def test_check_finds_no_fault_and_the_arrays_are_those_of_the_schema(made):
 
 
 def test_repository_that_grew_is_one_that_was_made_at_once(made, tmp_path):
-    finish(tmp_path / "tiny", configured("failing", volume={"size": [24, 20, 20]}), solved)
+    finish(tmp_path / "tiny", configured("failing", volume={"size": [24, 24, 20]}), solved)
     remake(tmp_path / "tiny", configured("failing"), solved)
     done = remake(tmp_path / "tiny", configured("half", "failing"), solved)
     assert done == ["tracking heart whole half", "repository"]
@@ -124,3 +127,23 @@ def test_run_on_two_cores_makes_the_bytes_of_jobs_in_one_process_and_a_report(tm
 def test_mixture_of_slices_and_volumes_and_what_needs_slices_is_refused(keys, said):
     with pytest.raises(ConfigError, match=said):
         expand(configured("half", **keys))
+
+
+def test_what_reads_slices_refuses_volumes_in_one_sentence(made):
+    repository = et.Repository(made)
+    for read in (repository.curves, repository.tracks, repository.summary, repository.metrics, repository.twist):
+        with pytest.raises(ValueError, match=r"^\w+: needs slices, and tiny has volumes: .*\.$"):
+            read()
+    with pytest.raises(ValueError, match=r"^--format gif: needs slices"):
+        Export(repository, "gif")
+    with pytest.raises(ValueError, match=r"^Segmentation: needs slices"):
+        Segmentation(made)
+    with pytest.raises(ValueError, match=r"^the viewer: needs slices"):
+        opened(made)
+
+
+def test_tracker_of_slices_is_refused_before_a_run():
+    config = et.configure(configured(), tracking={"trackers": {"flow": {"method": "dis"}}})
+    (concern,) = concerns(config)
+    assert concern.is_absurd and concern.text.startswith("tracking.trackers.flow.method tracks slices")
+    assert list(configured().tracking.trackers) == ["bspline_dic"]

@@ -174,9 +174,9 @@ class Figures:
         video.write(self.folder / "clip.mp4", np.concatenate([frames] * BEATS), FRAME_RATE, quality=20)
 
     def frames(self, height: int) -> NDArray[np.uint8]:
-        """Frames of the clip beside its truth, of a height, px; of volumes as wide as it would be."""
+        """Frames of the clip beside its truth, of a height, px."""
         if self.config.has_volumes:
-            return volume.film(self.repository.clip(self.case, self.view), self.shown, round(height * clip.WIDTH))
+            return volume.film(self.repository.clip(self.case, self.view), self.shown, height)
         size, plane = self.sizes[0], self.config.views[self.view].plane
         moving, _ = with_motion(self.repository, self.case, self.view, size)
         chosen = clip.thin(moving.position, ARROW_SPACING * size)

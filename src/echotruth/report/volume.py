@@ -67,25 +67,24 @@ def clips(repository: Repository, view: str) -> dict[str, Any]:
     return {case: _clip(repository, case, view, len(cases)) for case in cases}
 
 
-def film(clip: xr.Dataset, heart: Heart, width: int) -> NDArray[np.uint8]:
-    """Frames (frame, height, width, 3), RGB, of volumes, of even sides: B-mode, and below it the same with strain."""
-    grey, strain = _beside(list(slices(clip, heart)), width)
-    grey, strain = (values[:, : values.shape[1] // 2 * 2, : values.shape[2] // 2 * 2] for values in (grey, strain))
-    seen = np.repeat(grey[..., None], 3, axis=-1)
+def film(clip: xr.Dataset, heart: Heart, height: int) -> NDArray[np.uint8]:
+    """Frames (frame, height, width, 3), RGB, of volumes, of a height, px, or nearly; both sides are even."""
+    across, down = _extent(parts := list(slices(clip, heart)))
+    grey, strain = (
+        each[:, : each.shape[1] // 2 * 2] for each in _arranged(parts, 2 * round(height * across / down / 2))
+    )
     tint = np.stack([np.asarray(coloured(Image.fromarray(frame)).convert("RGBA"))[..., :3] for frame in strain])
     opacity = style.OPACITY * (strain > 0)[..., None]
-    known = np.rint((1 - opacity) * seen + opacity * tint).astype(np.uint8)
-    return np.concatenate([seen, known], axis=1)
+    return np.rint((1 - opacity) * grey[..., None] + opacity * tint).astype(np.uint8)
 
 
 def _clip(repository: Repository, case: str, view: str, count: int) -> dict[str, Any]:
     """The volumes of one case of several."""
     clip, heart = repository.clip(case, view), repository.heart(case)
-    parts, frames = list(slices(clip, heart)), clip.sizes["frame"]
-    across, down = _extent(parts)
-    width = min(MAX_WIDTH, int((MAX_PIXELS / (count * frames) * across / down) ** 0.5))
-    grey, strain = _beside(parts, width)
-    bar, scale = round_length(down), width / across
+    across, down = _extent(parts := list(slices(clip, heart)))
+    width = min(MAX_WIDTH, int((MAX_PIXELS / (count * clip.sizes["frame"]) * across / down) ** 0.5))
+    grey, strain = _arranged(parts, width)
+    bar, scale = round_length(across / 3), width / across
     mean = repository.read("kinematics/strain_mean", case, None, ..., LABELS["strain_component"].index("CC"))
     course = [round(100 * strain, 3) for strain in mean.tolist()]
     return sheets(grey, strain, grey.shape[:0:-1]) | {
@@ -98,29 +97,34 @@ def _clip(repository: Repository, case: str, view: str, count: int) -> dict[str,
         "chosen": [],
         "bar_px": round(bar * scale, 2),
         "bar": f"{1e3 * bar:g} mm",
-        "course": {
-            "title": "Circumferential strain, mean of the wall",
-            "true": course,
-        },
+        "course": {"title": "Circumferential strain, mean of the wall", "true": course},
     }
 
 
 def _extent(parts: list[Slice]) -> tuple[float, float]:
-    """Width of slices beside each other, and their height, m."""
-    return sum(part.sides[1] for part in parts), max(part.sides[0] for part in parts)
+    """Width of slices beside each other, and height of two rows of them, m."""
+    return sum(part.sides[1] for part in parts), 2 * max(part.sides[0] for part in parts)
 
 
-def _beside(parts: list[Slice], width: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Grey levels of slices beside each other, (frame, height, width), and steps of the scale of strain as well."""
+def _arranged(parts: list[Slice], width: int) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Slices beside each other, and below them once more with their strain.
+
+    Returns
+    -------
+    grey, strain : ndarray of shape (frame, height, width)
+        Grey levels, and steps of the scale of strain.
+    """
     across, down = _extent(parts)
-    scale = (width - GAP * (len(parts) - 1)) / across
-    found = np.zeros((2, len(parts[0].image), round(scale * down), width), np.uint8)
-    left = 0
+    scale, left = (width - GAP * (len(parts) - 1)) / across, 0
+    row = round(scale * down / 2)
+    grey, strain = np.zeros((2, len(parts[0].image), 2 * row + GAP, width), np.uint8)
     for part in parts:
-        height, wide = (round(scale * side) for side in part.sides)
-        for number, (grey, strain) in enumerate(zip(part.image, entries(part.strain), strict=True)):
-            for to, values, filter_ in ((0, grey, Image.Resampling.LANCZOS), (1, strain, Image.Resampling.NEAREST)):
-                resized = np.asarray(Image.fromarray(values).resize((wide, height), filter_))
-                found[to, number, :height, left : left + wide] = resized[:, : width - left]
-        left += wide + GAP
-    return found[0], found[1]
+        size = round(scale * part.sides[1]), round(scale * part.sides[0])
+        for number, (image, colour) in enumerate(zip(part.image, entries(part.strain), strict=True)):
+            seen = np.asarray(Image.fromarray(image).resize(size, Image.Resampling.LANCZOS))[:, : width - left]
+            known = np.asarray(Image.fromarray(colour).resize(size, Image.Resampling.NEAREST))[:, : width - left]
+            for top in (0, row + GAP):
+                grey[number, top : top + size[1], left : left + size[0]] = seen
+            strain[number, row + GAP : row + GAP + size[1], left : left + size[0]] = known
+        left += size[0] + GAP
+    return grey, strain

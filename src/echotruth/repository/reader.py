@@ -256,7 +256,7 @@ class Repository:
         size : int, optional
             Pixels along a side.
         variables : iterable of str, optional
-            Those to read, as `("image", "flow")`, and what follows from them. Default: all.
+            Those to read, as `("image", "flow")`, and what follows from them. Default: all; of volumes always all.
 
         Raises
         ------

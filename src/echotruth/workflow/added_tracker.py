@@ -204,5 +204,6 @@ def summary(rows: list[Row]) -> str:
     table = pd.DataFrame(rows)
     groups = table.assign(failed=table["failure"] != "").groupby(["view", "size_px"], sort=False)
     counts = {"clips": groups.size(), "failed": groups["failed"].sum()}
-    means = groups[["nrmse_all_percent", "nrmse_percent", "epe_um", "drift_um", "coverage_percent"]].mean()
+    shown = ("nrmse_all_percent", "nrmse_percent", "epe_um", "drift_um", "coverage_percent")
+    means = groups[[name for name in shown if name in table]].mean()  # volumes have no epe_um
     return means.assign(**counts).to_string(float_format="{:.1f}".format, na_rep="-")
