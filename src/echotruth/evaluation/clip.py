@@ -1,6 +1,8 @@
 """B-mode clips as trackers receive them."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from echotruth.loop.cycle import frame_times
 from echotruth.repository.reader import Repository
 from echotruth.section import Section
 from echotruth.seeds import generator
-from echotruth.tracking.point_grid import grid_pixels, grid_points
+from echotruth.tracking.point_grid import grid_points
 from echotruth.units import mm
 
 
@@ -153,13 +155,35 @@ def make_clip(case: Case, view: str, frames: np.ndarray, labels: np.ndarray, ins
     )
 
 
+def clips_of(case: Case, view: str, read: Callable[..., dict[str, Any]]) -> list[Any]:
+    """Clips of one view of one heart, one of each image size, or the :class:`.VolumeClip`.
+
+    Parameters
+    ----------
+    case : Case
+    view : str
+    read : callable
+        Returns arrays of a group of the view by name, given the group and the names.
+    """
+    if case.config.has_volumes:
+        from echotruth.evaluation.volume import VolumeClip  # compiled; slices need none of it
+
+        mask = unpack(read("truth/volume", "labels")["labels"][0], 3)["mask"]
+        return [VolumeClip(case, view, read("bmode/volume", "image")["image"], mask)]
+    inside, clips = read("points", "layer")["layer"] > 0, []
+    for size in case.config.bmode.sizes:
+        image, labels = read(f"bmode/{size}", "image")["image"], read(f"truth/{size}", "labels")["labels"]
+        clips.append(make_clip(case, view, image, labels[0], inside))
+    return clips
+
+
 def read_clips(repository: Repository, case: str, view: str) -> dict[int, Clip]:
     """Clips of one view of a repository, by image size."""
-    found = repository.case(case)
-    images = {size: repository.arrays(f"bmode/{size}", case, view, "image")["image"] for size in repository.sizes}
-    labels = {size: repository.read(f"truth/{size}/labels", case, view, 0) for size in repository.sizes}
-    inside = unpack(labels[repository.sizes[0]])["mask"][grid_pixels(found.config)]
-    return {size: make_clip(found, view, images[size], labels[size], inside) for size in repository.sizes}
+
+    def read(group: str, *names: str) -> dict[str, Any]:
+        return repository.arrays(group, case, view, *names)
+
+    return {clip.size: clip for clip in clips_of(repository.case(case), view, read)}
 
 
 def tracker_seed(case: Case, view: str) -> int:

@@ -33,6 +33,7 @@ from echotruth.loop.cycle import frame_times
 from echotruth.mechanics.contours import global_longitudinal_strain
 from echotruth.mechanics.fibres import axes_from_normal
 from echotruth.mechanics.twist import APICAL_SLICE, BASAL_SLICE, rotation
+from echotruth.repository.datasets import as_stored
 from echotruth.section import Section
 from echotruth.tracking.point_grid import grid_voxels, voxel_positions
 from echotruth.units import mm
@@ -191,6 +192,30 @@ class VolumePoints:
 
         _, nearest = cKDTree(start[known]).query(start)
         return start + moved[:, known][:, nearest]
+
+
+def scored_volumes(
+    clip: VolumeClip, estimate: tuple[Floats, Floats], heart: Heart, plane: Plane
+) -> dict[str, NDArray[Any] | list[Any]]:
+    """What a tracker found in volumes, as the store has it, and how it compares with the motion of the heart.
+
+    Parameters
+    ----------
+    clip : VolumeClip
+    estimate : tuple
+        What :func:`echotruth.tracking.tracker.track` returns of it.
+    heart, plane
+        As of :class:`VolumePoints`.
+
+    Returns
+    -------
+    dict
+        Arrays of a group `tracking/TRACKER`, and the coordinate `score` of its scores.
+    """
+    found = as_stored(clip.case, {"tracking/TRACKER": clip.arrays(*estimate)})["tracking/TRACKER"]
+    points = VolumePoints(heart, plane, clip.positions, strain_radius(clip.case.config))
+    scores = metrics(found["displacement"], points, heart.es)
+    return found | {"score": list(scores), "scores": list(scores.values())}
 
 
 def metrics(displacement: Floats, points: VolumePoints, es: int) -> dict[str, float]:
