@@ -147,3 +147,11 @@ def test_tracker_of_slices_is_refused_before_a_run():
     (concern,) = concerns(config)
     assert concern.is_absurd and concern.text.startswith("tracking.trackers.flow.method tracks slices")
     assert list(configured().tracking.trackers) == ["bspline_dic"]
+
+
+def test_volume_that_does_not_hold_the_heart_is_told_before_a_run():
+    def told(offset):
+        views = {"whole": {"plane": "volume", "offset": {"lateral_mm": offset}}}
+        return [concern.is_absurd for concern in concerns(configured(views=views))]
+
+    assert (told(0.5), told(1.5), told(-7.0)) == ([], [False], [True])

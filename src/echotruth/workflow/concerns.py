@@ -47,6 +47,19 @@ def _of_the_volumes(config: Config) -> Iterator[Concern]:
         if not isinstance(tracker, VOLUMETRIC):
             remedy = "use bspline_dic, or a function or program"
             yield Concern(f"tracking.trackers.{name}.method tracks slices, and the views are volumes: {remedy}", True)
+    if config.geometry.file is not None or config.motion.kind == "file":
+        return
+    (depth, _, width), radius = config.volume.field_mm, config.geometry.outer_radius_mm()
+    for name, view in config.views.items():
+        for key, side in (("axial_mm", depth), ("lateral_mm", width)):
+            offset = abs(getattr(view.offset, key))
+            if offset + radius > side / 2:
+                is_beside = offset - radius >= side / 2
+                text = (
+                    f"the heart, {2 * radius:.3g} mm wide, {'is beside' if is_beside else 'reaches beyond'} the volume"
+                )
+                remedy = f"use a smaller offset, or a side of more than {side:g} in volume.field_mm"
+                yield Concern(f"views.{name}.offset.{key}: {text}: {remedy}", is_beside)
 
 
 def _of_the_file(config: Config) -> Iterator[Concern]:
