@@ -40,7 +40,7 @@ def pytest_terminal_summary(terminalreporter):
 LONGEST = (
     *("test_slurm", "test_baselines", "test_states", "test_checks", "test_browser", "test_snakemake"),
     *("test_circulation", "test_notebooks", "test_added_tracker", "test_examples", "test_notebook", "test_estimate"),
-    *("test_peers", "test_site", "test_full_matrix"),
+    *("test_peers", "test_site", "test_full_matrix", "test_volume_stages"),
 )
 """Modules that take half a minute and more, longest first; the first two compile different functions."""
 
