@@ -35,11 +35,11 @@ def in_plane(probe, centres, across, axial, frequency):
     return directivity * wave * np.sqrt(SPEED / frequency / (1j * distance))
 
 
-def exact(array, probe, position, amplitude, exponent=0.0):
-    """Spectra (bins, columns, rows) at every 25th frequency, in float64."""
+def exact(array, probe, position, amplitude, exponent=0.0, bins=BINS):
+    """Spectra (bins, columns, rows) at every 25th frequency, or others, in float64."""
     ends = array.sensitivity(position[:, [0, 2]])
     spectra = []
-    for frequency in array.frequency[BINS]:
+    for frequency in array.frequency[bins]:
         columns = in_plane(probe, array.centres, position[:, 0], position[:, 1], frequency) * ends[:, 1]
         rows = in_plane(probe, array.centres, position[:, 2], position[:, 1], frequency) * ends[:, 0]
         strength = amplitude * (frequency / (probe.frequency_MHz * 1e6)) ** exponent
@@ -55,6 +55,13 @@ def error(found, true):
 def test_echoes_are_those_of_the_exact_sum(array, exponent):
     position, amplitude = scatterers(60)
     assert error(array(position, amplitude, exponent)[BINS], exact(array, PROBE, position, amplitude, exponent)) < 1e-3
+
+
+def test_volume_is_that_of_the_exact_sum():
+    scanner = VolumeScanner(configure(probe=PROBE, volume={"size": [36, 20, 18], "field_mm": [6.9, 6.9, 6.9]}))
+    array, (position, amplitude) = scanner.matrix, scatterers(60)
+    true = exact(array, PROBE, position, amplitude, bins=slice(None)).astype(np.complex64)
+    assert error(scanner.beamform(array(position, amplitude)), scanner.beamform(true)) < 1e-3
 
 
 def test_echoes_with_attenuation_are_those_of_the_exact_sum():

@@ -5,6 +5,7 @@ import pytest
 import yaml
 import zarr
 from finished_repository import content, finish, remake, solved
+from volume_repository import CONFIG, SHIFT
 from workspace import Workspace
 
 import echotruth as et
@@ -19,21 +20,10 @@ from echotruth.sharing.export import Export
 from echotruth.viewer.server import opened
 from echotruth.workflow.concerns import concerns
 
-CONFIG = """
-name: tiny
-geometry: {circumferential_elements: 12, longitudinal_elements: 6, transmural_elements: 1}
-loop: {frames: 3}
-motion: {kind: rigid, rigid: {lateral_um: 200, axial_um: -300, elevation_um: 250}}
-views: {whole: {plane: volume}}
-phantom: {density_per_mm3: 20}
-probe: {preset: mouse_row_column_15MHz, elements: 24, pitch_um: 360}
-volume: {size: [24, 24, 18], field_mm: [6.9, 8.6, 6.9]}
-"""
-
 
 def half(frames, points, mask, spacing, frame_time, seed, share=0.5):
     """A tracker that sees a share of the motion of `CONFIG` to the middle of the cycle."""
-    whole = share * np.array([0.2e-3, 0.25e-3, -0.3e-3]) / spacing  # lateral, elevation, depth
+    whole = share * SHIFT[[0, 2, 1]] / spacing  # lateral, elevation, depth
     return np.multiply.outer([0, 1, 0], np.broadcast_to(whole, points.shape))
 
 
@@ -72,11 +62,10 @@ def test_data_are_those_of_the_functions_in_memory(made):
 def test_points_move_as_the_formula_says_and_who_fails_has_no_estimate(made):
     repository = et.Repository(made)
     points = repository.arrays("points", "heart", "whole")
-    shift = np.array([0.2e-3, -0.3e-3, 0.25e-3])
     step = 0.3e-3 / 256
     np.testing.assert_allclose(points["true_displacement"].max(1) - points["true_displacement"].min(1), 0, atol=step)
     moved = np.abs(points["true_displacement"]).max((0, 1))
-    np.testing.assert_allclose(moved / moved[0], np.abs(shift) / shift[0], rtol=0.02)
+    np.testing.assert_allclose(moved / moved[0], np.abs(SHIFT) / SHIFT[0], rtol=0.02)
     rows = repository.scores.set_index("tracker")
     assert rows.loc["failing", ["nrmse_all_percent", "coverage_percent"]].tolist() == [100, 0]
     assert "sees nothing" in rows.loc["failing", "failure"] and rows.loc["half", "failure"] == ""

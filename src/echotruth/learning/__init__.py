@@ -7,5 +7,6 @@ from echotruth.learning.point_tracks import PointTracks
 from echotruth.learning.segmentation import Segmentation
 from echotruth.learning.splitting import split
 from echotruth.learning.table import cases
+from echotruth.learning.volume_pairs import VolumePairs
 
-__all__ = ["Clips", "FlowPairs", "Item", "Items", "PointTracks", "Segmentation", "cases", "split"]
+__all__ = ["Clips", "FlowPairs", "Item", "Items", "PointTracks", "Segmentation", "VolumePairs", "cases", "split"]

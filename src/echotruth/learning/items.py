@@ -8,7 +8,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from echotruth.repository.choice import Names, image_size, require_known, require_slices
+from echotruth.repository.choice import Names, image_size, require_known
 from echotruth.repository.reader import Repository
 from echotruth.units import mm
 
@@ -54,15 +54,21 @@ class Items(Sequence[Item]):
 
     stages: tuple[str, ...] = ("bmode", "truth")
     """Stages of which the groups of a clip are read."""
+    has_volumes = False
+    """Whether items are of volumes, and not of slices."""
 
     def __init__(self, repository: str | Path, cases: Any = None, views: Names = None, size: int | None = None) -> None:
         self.repository = Repository(repository)
         config = self.repository.config
-        require_slices(config, type(self).__name__)
+        if config.has_volumes != self.has_volumes:
+            needs, has = ("volumes", "slices") if self.has_volumes else ("slices", "volumes: take VolumePairs")
+            raise ValueError(f"{type(self).__name__}: needs {needs}, and {config.name} has {has}.")
         self.size = image_size(config, size)
+        self.group = config.image_names[config.image_sizes.index(self.size)]
+        """Last part of the names of groups of that size."""
         self.frames = config.loop.frames
         self.spacing = config.bmode.field_of_view_mm * mm / self.size
-        """Distance of pixel centres, m."""
+        """Distance of pixel centres, m; of volumes see :class:`VolumePairs`."""
         given = cases.index if hasattr(cases, "columns") else cases
         ids = _complete(self.repository) if given is None else _listed(given)
         names = list(config.views) if views is None else _listed(views)
@@ -72,9 +78,9 @@ class Items(Sequence[Item]):
         places = [(case, view) for case in cases for view in views]
         for case, view in places:
             for stage in self.stages:
-                if self.repository.attributes(f"{stage}/{self.size}", case, view).get("status") != "complete":
+                if self.repository.attributes(f"{stage}/{self.group}", case, view).get("status") != "complete":
                     raise ValueError(
-                        f"{self.repository.location}: {case} has no {stage}/{self.size} in the view {view}: "
+                        f"{self.repository.location}: {case} has no {stage}/{self.group} in the view {view}: "
                         "finish the run, or choose cases of status complete."
                     )
         return places
@@ -111,16 +117,16 @@ class Items(Sequence[Item]):
 
     def image(self, place: Place, frames: int | slice = slice(None)) -> NDArray[np.float32]:
         """Grey levels of one frame (axial, lateral) or several (frame, axial, lateral), from 0 to 1."""
-        grey = self.repository.read(f"bmode/{self.size}/image", *place, frames)
+        grey = self.repository.read(f"bmode/{self.group}/image", *place, frames)
         return np.divide(grey, 255, dtype=np.float32)
 
     def truth(self, place: Place, name: str, *index: Any) -> NDArray[Any]:
         """Part of an array of the truth of a clip."""
-        return self.repository.read(f"truth/{self.size}/{name}", *place, *index)
+        return self.repository.read(f"truth/{self.group}/{name}", *place, *index)
 
     def time(self, place: Place) -> NDArray[np.float32]:
         """Time of each frame since end-diastole, (frame,), s."""
-        return self.repository.read(f"bmode/{self.size}/time", *place).astype(np.float32)
+        return self.repository.read(f"bmode/{self.group}/time", *place).astype(np.float32)
 
 
 def _listed(names: Any) -> list[str]:

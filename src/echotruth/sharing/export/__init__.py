@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Literal
 
 from echotruth.config import shipped
-from echotruth.repository.choice import chosen, require_slices
+from echotruth.repository.choice import chosen
 from echotruth.repository.reader import Repository
 from echotruth.sharing.export.clip import ExportedClip
 from echotruth.sharing.export.destination import draft
@@ -39,6 +39,8 @@ class Format:
         What a file is of.
     options : tuple of {"overlay", "rate", "trackers"}
         What options it takes, beside which cases, views and sizes to write.
+    of : {"slices", "volumes"}
+        What it can hold; of a heart it holds no images.
     table : str
         Name of one more file, of all clips, that its module writes with `write_summary`; "" for none.
     """
@@ -48,6 +50,7 @@ class Format:
     stages: tuple[str, ...] = ("truth", "bmode")
     holds: Literal["clip", "view", "heart"] = "clip"
     options: tuple[str, ...] = ()
+    of: tuple[str, ...] = ("slices",)
     table: str = ""
 
     def takes(self, option: str) -> bool:
@@ -64,15 +67,17 @@ class Format:
         return import_module(f"echotruth.sharing.export.{self.module}")
 
 
+BOTH = ("slices", "volumes")
 FORMATS = {
     "mp4": Format("mp4", ".mp4", options=("overlay", "rate")),
     "gif": Format("gif", ".gif", options=("overlay", "rate")),
     "png": Format("png", "", options=("overlay",)),
-    "nifti": Format("nifti", ".nii.gz"),
+    "nifti": Format("nifti", ".nii.gz", of=BOTH),
     "dicom": Format("dicom", ".dcm"),
-    "vtk": Format("vtk", "", (), "heart"),
+    "vtk": Format("vtk", "", (), "heart", of=BOTH),
+    "vti": Format("vti", "", of=("volumes",)),
     "csv": Format("curves", ".csv", ("points",), options=("trackers",), table="summary.csv"),
-    "tap": Format("tap", ".npz"),
+    "tap": Format("tap", ".npz", of=BOTH),
     "uff": Format("uff", ".uff", ("rf",), "view"),
     "zea": Format("zea", ".hdf5", ("rf",), "view"),
     "echoxflow": Format("echoxflow", ".zarr", ("rf",), "view", table="croissant.json"),
@@ -116,8 +121,10 @@ class Export:
     output: Path | None = None
 
     def __post_init__(self) -> None:
-        if FORMATS[self.format].holds != "heart":
-            require_slices(self.repository.config, f"--format {self.format}")
+        has, name = BOTH[self.repository.config.has_volumes], self.repository.config.name
+        if has not in FORMATS[self.format].of:
+            able = ", ".join(key for key, form in FORMATS.items() if has in form.of)
+            raise ExportError(f"--format {self.format}: {name} has {has}, for which there are {able}")
         for name in ("overlay", "rate", "views", "sizes", "trackers"):
             if getattr(self, name) and not FORMATS[self.format].takes(name):
                 able = ", ".join(key for key, form in FORMATS.items() if form.takes(name))

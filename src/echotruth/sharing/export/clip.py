@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from echotruth.arrays import Floats
 from echotruth.cases import Case
 from echotruth.heart import Heart
+from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.view import Plane
 from echotruth.notebook.point_tracks import point_tracks
@@ -29,7 +30,7 @@ class ExportedClip:
     view : str
         Name of the view; "" for the heart itself.
     size : int
-        Pixels along a side; 0 for the heart or the view itself.
+        Pixels along a side, of volumes the most voxels along one; 0 for the heart or the view itself.
     """
 
     repository: Repository
@@ -44,8 +45,9 @@ class ExportedClip:
 
     @cached_property
     def image(self) -> NDArray[np.uint8]:
-        """Grey levels, (frame, axial, lateral)."""
-        return self.repository.arrays(f"bmode/{self.size}", self.case.id, self.view, "image")["image"]
+        """Grey levels, (frame, axial, lateral), or (frame, axial, elevation, lateral)."""
+        name = "volume" if self.case.config.has_volumes else self.size
+        return self.repository.arrays(f"bmode/{name}", self.case.id, self.view, "image")["image"]
 
     def truth(self, *variables: str) -> xr.Dataset:
         """Some variables of the clip, or all, as :meth:`echotruth.Repository.clip` returns them."""
@@ -75,6 +77,22 @@ class ExportedClip:
     def spacing(self) -> float:
         """Distance of pixel centres, m, the same in both directions."""
         return float(self.case.config.bmode.field_of_view_mm * mm) / self.size
+
+    @property
+    def sides(self) -> Floats:
+        """Sides of a pixel, which is as thick as wide, or of a voxel, (3,), m: lateral, axial, elevation."""
+        config = self.case.config
+        if config.has_volumes:
+            return np.array(config.volume.voxel_mm)[[2, 0, 1]] * mm
+        return np.full(3, self.spacing)
+
+    @property
+    def corner(self) -> Floats:
+        """Centre of the first pixel or voxel before the array, (3,), m: lateral, axial, elevation."""
+        if self.case.config.has_volumes:
+            axial, elevation, lateral = (along[0] for along in voxel_centres(self.case.config))
+            return np.array([lateral, axial, elevation])
+        return np.array([self.lateral[0], self.axial[0], 0.0])
 
     @property
     def axial(self) -> Floats:

@@ -1,4 +1,4 @@
-"""NIfTI-1 (https://nifti.nimh.nih.gov/nifti-1): a plane over time, placed in the frame of the heart."""
+"""NIfTI-1 (https://nifti.nimh.nih.gov/nifti-1): a plane or volume over time, placed in the frame of the heart."""
 
 import gzip
 from pathlib import Path
@@ -17,9 +17,9 @@ ALIGNED = 2
 
 
 def write(clip: ExportedClip, path: Path) -> None:
-    """Write grey levels, (lateral, axial, 1, frame), with the affine to the frame of the heart.
+    """Write grey levels, (lateral, axial, elevation, frame), with the affine to the frame of the heart.
 
-    The plane is given the thickness of a pixel, since the format needs one. The frame of the heart stands in place of
+    A plane is given the thickness of a pixel, since the format needs one. The frame of the heart stands in place of
     the patient's (right, anterior, superior): x is septal, y anterior, and z points from apex to base.
 
     Parameters
@@ -33,12 +33,12 @@ def write(clip: ExportedClip, path: Path) -> None:
         If nibabel is not installed.
     """
     nibabel = optional("nibabel")
-    data = np.ascontiguousarray(clip.image.transpose(2, 1, 0)[:, :, None])
-    image = nibabel.Nifti1Image(data, None)
+    grey = clip.image if clip.image.ndim == 4 else clip.image[:, :, None]
+    image = nibabel.Nifti1Image(np.ascontiguousarray(grey.transpose(3, 1, 2, 0)), None)
     image.header.set_xyzt_units("mm", "sec")
     image.set_sform(affine(clip), ALIGNED)
     image.set_qform(affine(clip), ALIGNED)
-    image.header.set_zooms((MM * clip.spacing,) * 3 + (clip.frame_time,))
+    image.header.set_zooms((*MM * clip.sides, clip.frame_time))
     image.header["descrip"] = f"echotruth, synthetic: {clip.name}".encode()[:79]
     # The compressed file has neither name nor date, so that it is the same twice.
     with path.open("wb") as file, gzip.GzipFile("", "wb", 6, file, mtime=0) as packed:
@@ -46,9 +46,8 @@ def write(clip: ExportedClip, path: Path) -> None:
 
 
 def affine(clip: ExportedClip) -> NDArray[np.float64]:
-    """Matrix from voxel (lateral, axial, 0, 1) to the frame of the heart at end-diastole, mm, (4, 4)."""
-    corner = clip.plane.to_heart(np.array([clip.lateral[0], clip.axial[0], 0.0]))
+    """Matrix from voxel (lateral, axial, elevation, 1) to the frame of the heart at end-diastole, mm, (4, 4)."""
     matrix = np.eye(4)
-    matrix[:3, :3] = MM * clip.spacing * clip.plane.axes.T
-    matrix[:3, 3] = MM * corner
+    matrix[:3, :3] = MM * clip.plane.axes.T * clip.sides
+    matrix[:3, 3] = MM * clip.plane.to_heart(clip.corner)
     return matrix

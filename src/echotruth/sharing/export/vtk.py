@@ -44,15 +44,16 @@ def write(clip: ExportedClip, path: Path) -> None:
         for group, label in (("fibres", "layer"), ("fibres", "segment"), ("pathology", "region")):
             grid.cell_data[label] = arrays[group][label]
         grid.field_data["time_s"] = np.array([clip.time[frame]])
-        (path / name).write_text(_content(grid))
-    (path / f"{clip.case.id}.pvd").write_text(_collection(names, clip.time))
+        (path / name).write_text(content(grid))
+    (path / f"{clip.case.id}.pvd").write_text(collection(names, clip.time))
 
 
-def _content(grid: Any) -> str:
-    """The file of a mesh; made in memory, since VTK does not tell of a disk that is full."""
-    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+def content(grid: Any) -> str:
+    """The file of a mesh or of voxels; made in memory, since VTK does not tell of a disk that is full."""
+    from vtkmodules import vtkIOXML
 
-    writer = vtkXMLUnstructuredGridWriter()
+    kind = "ImageData" if grid.IsA("vtkImageData") else "UnstructuredGrid"
+    writer = getattr(vtkIOXML, f"vtkXML{kind}Writer")()
     writer.SetInputData(grid)
     writer.WriteToOutputStringOn()
     writer.Write()
@@ -67,7 +68,7 @@ def fibres(heart: Heart, frame: int) -> Floats:
     return unit(np.einsum("cij,cj->ci", deformation, heart.arrays["fibres"]["fibre"]))
 
 
-def _collection(names: list[str], time: Floats) -> str:
+def collection(names: list[str], time: Floats) -> str:
     """ParaView's list of files and times (s)."""
     sets = "\n".join(
         f'    <DataSet timestep="{at:.9g}" part="0" file={quoteattr(name)}/>'

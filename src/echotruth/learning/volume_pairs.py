@@ -1,0 +1,76 @@
+"""Pairs of volumes in succession with the motion between them."""
+
+from typing import Any
+
+import numpy as np
+
+from echotruth.heart import Heart
+from echotruth.imaging.beamforming.scan import voxel_centres
+from echotruth.imaging.flow import STEPS
+from echotruth.imaging.truth import PixelTruth
+from echotruth.imaging.view import Plane, before_probe
+from echotruth.learning.items import Item, Items, Place
+from echotruth.units import mm
+
+NEXT = list(STEPS).index("next")
+
+
+class VolumePairs(Items):
+    """Each volume with the next one, and the motion of the tissue from one to the other.
+
+    An item has
+
+    - `image` (2, axial, elevation, lateral), 0 to 1, `frame`, the index of the first, and `spacing` (3,), m: lateral,
+      axial and elevation side of a voxel;
+    - `flow` (3, axial, elevation, lateral), voxels: lateral, axial and elevation motion of the tissue at a voxel of the
+      first volume to where it is in the second, and `flow_m`, the same in m; 0 outside the wall;
+    - `wall` (axial, elevation, lateral), bool: voxels of the first volume that are in the wall, where flow is known.
+
+    Flow is computed from the motion of the heart when an item is asked for, which takes a second of a default volume.
+
+    Parameters
+    ----------
+    repository, cases, views, size
+        See :class:`Items`; there is one size.
+
+    Examples
+    --------
+    >>> from echotruth.learning import VolumePairs
+    >>> pairs = VolumePairs("out/volumes")  # doctest: +SKIP
+    >>> pairs[0]["flow"].shape  # doctest: +SKIP
+    (3, 128, 120, 120)
+    """
+
+    has_volumes = True
+    _kept: tuple[Place, Heart, Plane] | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_kept": None}
+
+    @property
+    def per_clip(self) -> int:
+        return self.frames - 1
+
+    def item(self, place: Place, within: int) -> Item:
+        config = self.repository.case(place[0]).config
+        (axial, elevation, lateral), (heart, plane) = voxel_centres(config), self._before_probe(place)
+        truth = PixelTruth(heart, plane, axial, lateral, elevation=elevation, frames=[within])
+        forth = np.ascontiguousarray(np.moveaxis(truth["flow"][0, NEXT], -1, 0))
+        wall, sides = np.isfinite(forth[0]), (np.array(config.volume.voxel_mm)[[2, 0, 1]] * mm).astype(np.float32)
+        flow = np.where(wall, forth, np.float32(0))
+        return {
+            "image": self.image(place, slice(within, within + 2)),
+            "frame": within,
+            "spacing": sides,
+            "flow": flow / sides[:, None, None, None],
+            "flow_m": flow,
+            "wall": wall,
+        }
+
+    def _before_probe(self, place: Place) -> tuple[Heart, Plane]:
+        """The heart as it moves before the probe, and the plane of a view; the last are kept."""
+        if self._kept is None or self._kept[0] != place:
+            case, view = place
+            heart = self.repository.heart(case)
+            self._kept = place, *before_probe(heart, self.repository.case(case).config, view)
+        return self._kept[1:]
