@@ -6,7 +6,7 @@ from pathlib import Path
 
 from echotruth.cli.command import add_repeated, fail
 
-EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "csv", "tap", "uff", "zea", "echoxflow")
+EXPORTED = ("mp4", "gif", "png", "nifti", "dicom", "vtk", "vti", "csv", "tap", "uff", "zea", "echoxflow")
 """Formats of `echotruth export`."""
 
 
