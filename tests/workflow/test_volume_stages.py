@@ -11,12 +11,10 @@ from workspace import Workspace
 import echotruth as et
 from echotruth.cases import expand
 from echotruth.config.loading import ConfigError
-from echotruth.learning import Segmentation
 from echotruth.repository import schema
 from echotruth.repository.check import check
 from echotruth.repository.group import part
 from echotruth.repository.places import group_of
-from echotruth.sharing.export import Export
 from echotruth.viewer.server import opened
 from echotruth.workflow.concerns import concerns
 
@@ -123,10 +121,6 @@ def test_what_reads_slices_refuses_volumes_in_one_sentence(made):
     for read in (repository.curves, repository.tracks, repository.summary, repository.metrics, repository.twist):
         with pytest.raises(ValueError, match=r"^\w+: needs slices, and tiny has volumes: .*\.$"):
             read()
-    with pytest.raises(ValueError, match=r"^--format gif: needs slices"):
-        Export(repository, "gif")
-    with pytest.raises(ValueError, match=r"^Segmentation: needs slices"):
-        Segmentation(made)
     with pytest.raises(ValueError, match=r"^the viewer: needs slices"):
         opened(made)
 
