@@ -83,7 +83,8 @@ def _segments(random, strain, share, shown, blur, noise):
             "infarct_extent": share[aha - 1],
             "epicardial_share": 0,
         }
-        values |= {"true_peak_percent": strain[aha - 1], "tracked_peak_percent": tracked[aha - 1]}
+        for name, of in (("true", strain), ("tracked", tracked)):
+            values |= {f"{name}_peak_percent": of[aha - 1], f"radial_{name}_peak_percent": -2 * of[aha - 1]}
         row |= {f"{name}_{aha:02d}": value for name, value in values.items()}
     return row
 

@@ -41,18 +41,25 @@ TEXT = (*(name for name in IDENTITY if name not in ("part", "size_px")), "plane"
 OF_SEGMENT = segment_strain.COLUMNS[2:]
 """Columns of a segment and component: those of the long table less `aha` and `component`."""
 
+OF_COMPONENT = tuple(name for name in OF_SEGMENT if name.startswith(segment_strain.WHAT))
+"""Those of them that differ from component to component."""
+
 TANGENTIAL = {"short_axis": "circumferential", "long_axis": "longitudinal"}
-"""Plane -> the component of strain that is kept of its segments."""
+"""Plane -> the component of strain along the wall."""
+
+PREFIX = {True: f"{segment_strain.RADIAL}_", False: ""}
+"""Whether a component is radial -> what its columns begin with."""
 
 
 def packed_segments(rows: Iterable[Row]) -> Row:
-    """Columns of the tangential strain of segments: `NAME_SS`, SS the AHA segment, as `true_es_percent_07`."""
-    return {
-        f"{name}_{int(row['aha']):02d}": row[name]
-        for row in rows
-        if row["component"] != segment_strain.RADIAL
-        for name in OF_SEGMENT
-    }
+    """Columns of the strain of segments: `NAME_SS`, SS the AHA segment, as `true_es_percent_07`; radial ones begin with
+    `radial_`."""
+    found: Row = {}
+    for row in rows:
+        is_radial = row["component"] == segment_strain.RADIAL
+        names = OF_COMPONENT if is_radial else OF_SEGMENT
+        found |= {f"{PREFIX[is_radial]}{name}_{int(row['aha']):02d}": row[name] for name in names}
+    return found
 
 
 def packed_reliability(rows: Iterable[Row]) -> Row:
@@ -60,20 +67,24 @@ def packed_reliability(rows: Iterable[Row]) -> Row:
     return {f"{name}_{step}": row[name] for step, row in enumerate(rows) for name in steps.COUNTS}
 
 
-def segments(table: pd.DataFrame) -> pd.DataFrame:
-    """Segments as rows: columns `IDENTITY`, and those of `ClipMetrics.segments`, of the tangential component.
+def segments(table: pd.DataFrame, is_radial: bool = False) -> pd.DataFrame:
+    """Segments as rows: columns `IDENTITY`, and those of `ClipMetrics.segments`, of one component.
 
     Parameters
     ----------
     table : DataFrame
         As :func:`.parts.read_parts` returns it.
+    is_radial : bool
+        Whether the radial strain is wanted, and not that along the wall.
     """
     found = []
     for aha in range(1, SEGMENTS + 1):
-        names = {f"{name}_{aha:02d}": name for name in OF_SEGMENT if f"{name}_{aha:02d}" in table}
+        names = {f"{PREFIX[is_radial and name in OF_COMPONENT]}{name}_{aha:02d}": name for name in OF_SEGMENT}
+        names = {column: name for column, name in names.items() if column in table}
         if names:
+            component = segment_strain.RADIAL if is_radial else table["plane"].map(TANGENTIAL)
             rows = table[[*IDENTITY, *names]].rename(columns=names)
-            found.append(rows.assign(aha=aha, component=table["plane"].map(TANGENTIAL)).dropna(subset=["points"]))
+            found.append(rows.assign(aha=aha, component=component).dropna(subset=["points"]))
     return pd.concat(found, ignore_index=True)
 
 

@@ -29,32 +29,38 @@ from echotruth.repository.datasets import as_stored
 from echotruth.repository.version import Versions, settings_hash
 from echotruth.section import value_of
 
-SEED, HEARTS_OF_PART, ATTEMPTS = 2, 8, 20
+SEED, HEARTS_OF_PART, ATTEMPTS = 3, 8, 20
 HUMAN_SCALE = 12.5
 """Length of a human heart over that of a mouse."""
 
 PLAN: dict[tuple[str, str], dict[str, int]] = {
-    ("develop", "mouse"): {"healthy": 3, "infarct": 4, "late_activation": 2, "hypertrophy": 1, "dilation": 2},
-    ("develop", "human"): {"healthy": 1, "infarct": 1, "late_activation": 1, "dilation": 1},
+    ("develop", "mouse"): {"healthy": 3, "infarct": 3, "late_activation": 1, "hypertrophy": 1, "dilation": 2},
+    ("develop", "human"): {"healthy": 2, "infarct": 2, "late_activation": 1, "dilation": 1},
     ("test", "mouse"): {"healthy": 12, "infarct": 16, "late_activation": 7, "hypertrophy": 6, "dilation": 7},
     ("test", "human"): {"healthy": 4, "infarct": 5, "late_activation": 3, "hypertrophy": 2, "dilation": 2},
-    ("calibration", "mouse"): {"healthy": 3, "infarct": 4, "late_activation": 2, "hypertrophy": 1, "dilation": 2},
-    ("calibration", "human"): {"healthy": 3, "infarct": 4, "late_activation": 2, "hypertrophy": 1, "dilation": 2},
 }
 """Split and species -> number of hearts of each group."""
 BLOCKS = ([("develop", "mouse"), ("develop", "human")], [("test", "mouse")], [("test", "human")])
-"""What shares parts. Hearts of the split calibration are in none: on them the quality is fitted
-(benchmarks/quality.py)."""
+"""What shares parts."""
+CONDITIONS = ("none", "shadow", "ideal", "motion", "low_rate", "shadow", "motion", "ideal")
+"""Conditions, which the hearts of each group take in turn, so that all diseases are seen in all of them. `ideal` is a
+heart without a condition that is imaged with ideal acoustics too."""
 
 SETTINGS: dict[str, Any] = {
     "geometry": {"circumferential_elements": 12, "longitudinal_elements": 8, "transmural_elements": 2},
-    "loop": {"kind": "circulation", "frames": 20},
+    "loop": {"kind": "circulation"},
     "rf": {"focal_zones": 5, "lines": 192},
     "probe": {"elements": 64},
     "bmode": {"size_px": 256, "downsampling": (1, 2)},
     "views": {"mid": {"plane": "short_axis"}, "long_axis": {"plane": "long_axis"}},
 }
 """Of every case."""
+OF_SPECIES: dict[str, dict[str, Any]] = {
+    "mouse": {"loop.frames": 20, "tracking.grid": 0.016},
+    "human": {"loop.frames": 40, "tracking.grid": 0.008},
+}
+"""Frames of a beat, in people 40 to 58 a second, and distance of the points over the side of the image: the wall of
+people is thinner in theirs."""
 
 TRACKERS: dict[str, dict[str, Any]] = {
     "as_published": {"method": "phase_correlation"},
@@ -67,25 +73,30 @@ TRACKERS: dict[str, dict[str, Any]] = {
     },
     "window_deformation": {"method": "window_deformation"},
     "affine_dic": {"method": "external", "track": "examples.affine_dic:track"},
+    "farneback": {"method": "external", "track": "examples.farneback:track"},
+    "block_matching": {"method": "external", "track": "examples.block_matching:track"},
     "dis": {"method": "dis"},
     "dis_fine": {"method": "dis", "preset": "fine"},
     "bspline_dic": {"method": "bspline_dic"},
     "bspline_cnn": {"method": "bspline_cnn"},
 }
-WINDOW_MM = 1.5
-"""Window of `corrected` in a mouse."""
-SUBSET_MM = 1.0
-"""Subset of `affine_dic` in a mouse."""
+Keys = dict[str, Any]
+"""Dotted key -> value, or a range (tuple) or choices (list) from which it is drawn."""
+
+LENGTHS_MM: dict[str, Keys] = {
+    "corrected": {"window_mm": 1.5},
+    "affine_dic": {"options": {"subset_mm": 1.0}},
+    "farneback": {"options": {"window_mm": 1.0}},
+    "block_matching": {"options": {"block_mm": 1.0}},
+}
+"""Settings of trackers that are lengths in the wall of a mouse."""
 
 FILES = (
     *(Path(__file__).parent / f"{name}.py" for name in ("hearts", "scores", "columns")),
     *(PACKAGE / f"config/{name}" for name in ("diagnosis.py", "bounds.csv")),
-    Path(__file__).parents[2] / "examples/affine_dic.py",
+    *(Path(__file__).parents[2] / f"examples/{name}.py" for name in ("affine_dic", "farneback", "block_matching")),
 )
 """Files on which the numbers depend, beside those that the version of a view counts."""
-
-Keys = dict[str, Any]
-"""Dotted key -> value, or a range (tuple) or choices (list) from which it is drawn."""
 
 SHAPE: Keys = {
     key: tuple(given["uniform"]) for key, given in HEARTS.items() if "uniform" in given and not key.startswith("loop.")
@@ -101,13 +112,15 @@ KINDS: dict[str, list[Keys]] = {
     "healthy": [{}],
     "infarct": [
         _infarct(radius_mm=(0.5, 0.8), position=(0.4, 0.6), azimuth_deg=(-180, 180), age="fresh"),
-        _infarct(segments=[[1, 7, 8, 13, 14], [5, 6, 11, 12, 16]], age="fresh", remote_tension_scale=(0.75, 1)),
-        _infarct(segments=[[7, 8, 12], [8, 9, 14], [10, 11, 15]], age="fresh", transmurality=(0.4, 0.6)),
+        _infarct(segments=[[7, 8, 12], [8, 9, 14], [10, 11, 15]], age="fresh", transmurality=(0.2, 0.5)),
         _infarct(segments=[[7, 8], [9, 10], [11, 12]], age="old"),
-        _infarct(segments=[[7, 12], [8, 9], [10, 11]], tension_scale=(0.3, 0.7), stiffness_scale=(1, 3)),
+        _infarct(segments=[[7, 12, 13], [8, 9, 14], [10, 11, 15]], age="old", transmurality=(0.2, 0.5)),
+        _infarct(segments=[[1, 7, 8, 13, 14], [5, 6, 11, 12, 16]], age="fresh", remote_tension_scale=(0.75, 1)),
+        _infarct(
+            segments=[[7, 8], [9, 10], [11, 12]], transmurality=(0.2, 0.5), tension_scale=(0, 0.5), border_mm=(0, 0.3)
+        ),
         _infarct(segments=[[13, 14, 15, 16, 17], [8, 9, 14, 17]], age="old", border_mm=(0, 0.3)),
-        _infarct(segments=[[7, 8, 13], [9, 10, 15], [11, 12, 16]], age="fresh", border_mm=(0.1, 0.4)),
-        _infarct(segments=[[7, 8, 12, 13, 14], [4, 9, 10, 11, 15]], age="old"),
+        _infarct(segments=[[7, 8, 13], [9, 10, 15], [11, 12, 16]], age="fresh", transmurality=(0.2, 0.5)),
     ],
     "late_activation": [
         {"pathology.activation.preset": "lbbb"},
@@ -210,11 +223,11 @@ def _condition(species: str, condition: str, random: Random) -> Keys:
 def configured(species: str, keys: Keys, trackers: dict[str, Any] | None = None) -> et.Config:
     """Configuration of a clip: the settings of every case, and keys; trackers are those of the suite by default."""
     if trackers is None:
-        corrected = TRACKERS["corrected"] | _scaled(species, {"window_mm": WINDOW_MM})
-        affine = TRACKERS["affine_dic"] | {"options": _scaled(species, {"subset_mm": SUBSET_MM})}
-        trackers = TRACKERS | {"corrected": corrected, "affine_dic": affine}
-    settings = SETTINGS | {"tracking": {"grid": 0.016, "trackers": trackers}}
-    return et.configure(merged(settings, nested({"geometry.preset": species} | keys), whole=()))
+        lengths = {name: _scaled(species, given) for name, given in LENGTHS_MM.items()}
+        trackers = {name: given | lengths.get(name, {}) for name, given in TRACKERS.items()}
+    settings = SETTINGS | {"tracking": {"trackers": trackers}}
+    own = {"geometry.preset": species} | OF_SPECIES[species]
+    return et.configure(merged(settings, nested(own | keys), whole=()))
 
 
 def drawn(keys: Keys, random: Random) -> Keys:
@@ -231,7 +244,13 @@ def _drawn(value: Any, random: Random) -> Any:
 def _scaled(species: str, keys: Keys) -> Keys:
     """Lengths of a mouse as those of a species."""
     factor = HUMAN_SCALE if species == "human" else 1
-    return {key: round(factor * value, 4) if key.endswith("_mm") else value for key, value in keys.items()}
+
+    def scaled(key: str, value: Any) -> Any:
+        if isinstance(value, dict):
+            return _scaled(species, value)
+        return round(factor * value, 4) if key.endswith("_mm") else value
+
+    return {key: scaled(key, value) for key, value in keys.items()}
 
 
 def plan(blocks: Iterable[list[tuple[str, str]]] = BLOCKS) -> list[dict[str, Any]]:
@@ -248,21 +267,14 @@ def plan(blocks: Iterable[list[tuple[str, str]]] = BLOCKS) -> list[dict[str, Any
 def _planned(split: str, species: str) -> Iterable[dict[str, Any]]:
     """Hearts of a split and species; `place` spreads those of each group evenly from 0 to 1."""
     groups = PLAN[split, species]
-    number = sum(groups.values())
-    counts = {"motion": number // 4, "shadow": number // 4, "low_rate": number // 8, "ideal": ceil(number / 5)}
-    counts["none"] = number - sum(counts.values())
-    random = Random(f"{SEED} {split} {species}")
-    # Each condition is spread over the groups, but not over the same kinds of them.
-    spread = sorted(((k + random.random()) / count, name) for name, count in counts.items() for k in range(count))
-    conditions = [name for _, name in spread]
     before = list(PLAN)[: list(PLAN).index((split, species))]
     first = 1 + sum(sum(PLAN[key].values()) for key in before if key[1] == species)
-    for group, count in groups.items():
+    for turn, (group, count) in enumerate(groups.items()):
         for k in range(count):
-            heart = f"{species}{first:02d}"
-            kind = k % len(KINDS[group])
-            row = {"split": split, "species": species, "heart": heart, "group": group, "kind": kind}
-            yield row | {"condition": conditions.pop(0), "place": (k + 0.5) / count}
+            # Each round begins elsewhere, lest a kind always have the same condition.
+            condition = CONDITIONS[(k + turn + 3 * (k // len(CONDITIONS))) % len(CONDITIONS)]
+            row = {"split": split, "species": species, "heart": f"{species}{first:02d}", "group": group}
+            yield row | {"kind": k % len(KINDS[group]), "condition": condition, "place": (k + 0.5) / count}
             first += 1
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from numpy.typing import NDArray
 
 from echotruth import files
 from echotruth.evaluation.agreement import limits_of_agreement
@@ -22,7 +23,7 @@ from echotruth.evaluation.paired_ratios import LEAST_HEARTS
 from . import charts, columns, power, quality
 from .comparison import against, by_heart, deviation, ranking, scores
 from .detection import detection, recovery
-from .parts import FOLDER
+from .parts import CLIP, FOLDER
 
 REFERENCE = "bspline_dic"
 """Tracker with which others are compared in people, who are few."""
@@ -70,7 +71,7 @@ class Page:
         self.clips = parts[parts["split"] == split].assign(failure=lambda rows: rows["failure"].fillna(""))
         self.sizes: list[int] = sorted(map(int, self.clips["size_px"].unique()), reverse=True)
         self.mice, self.people = (self.of(species=name, acoustics="realistic") for name in ("mouse", "human"))
-        self.boards = {size: ranking(scores(self.mice[self.mice["size_px"] == size])) for size in self.sizes}
+        self.boards = {size: ranking(scores(self.at(size))) for size in self.sizes}
         self.order = [str(name) for name in next(iter(self.boards.values())).index] if len(self.mice) else []
         self.hearts = {"mice": self.mice["heart"].nunique(), "people": self.people["heart"].nunique()}
         self.deviations = {
@@ -87,14 +88,21 @@ class Page:
         """Those of some clips at the largest image size."""
         return clips[clips["size_px"] == max(self.sizes, default=0)]
 
-    def _power(self) -> dict[str, power.Power]:
-        """What the hearts can show, by who is compared."""
+    def _power(self, effect: float = 0.0) -> dict[str, power.Power]:
+        """What the hearts can show, by who is compared, where diseases have an effect of this size."""
         kinds = (("mice", "each with each", False), ("mice", "with one", True), ("people", "with one", True))
         return {
-            f"{self.hearts[name]} {name}, {words}": power.simulate(self.hearts[name], self.deviations[name], is_one)
+            f"{self.hearts[name]} {name}, {words}": power.simulate(
+                self.groups(name), self.deviations[name], is_one, effect
+            )
             for name, words, is_one in kinds
             if self.hearts[name] >= LEAST_HEARTS and np.isfinite(self.deviations[name])
         }
+
+    def groups(self, name: str) -> NDArray[np.str_]:
+        """Disease of each of the mice or people."""
+        clips = self.mice if name == "mice" else self.people
+        return clips.drop_duplicates("heart")["group"].to_numpy(str)
 
     def contents(self) -> str:
         """Number of hearts by group and species."""
@@ -109,6 +117,7 @@ class Page:
         of = self.at_largest(self.mice).groupby("tracker")
         others = {metric: about for metric, about in OTHERS.items() if metric in self.mice}
         medians, failed = of[list(others)].median(), of["failure"].agg(lambda text: (text != "").sum())
+        slowest = of["cpu_s"].quantile(0.99) if "cpu_s" in others else pd.Series(np.nan, medians.index)
         rows = []
         for name, row in self.boards[first].iterrows():
             cells = [ranks(row), number(row["score"]), interval(row, 2)]
@@ -116,10 +125,11 @@ class Page:
                 other = self.boards[size].reindex([name]).iloc[0]
                 cells += [ranks(other), number(other["score"])]
             cells += [number(medians.at[name, metric], digits) for metric, (_, digits) in others.items()]
-            rows.append([f"`{name}`", *cells, f"{failed[name]} of {of.size()[name]}"])
+            rows.append([f"`{name}`", *cells, number(slowest[name], 2), f"{failed[name]} of {of.size()[name]}"])
         headings = ["rank", f"NRMSE at {first} px (%)", "to the first"]
         headings += [text for size in rest for text in (f"rank at {size} px", f"NRMSE at {size} px (%)")]
-        return markdown(["tracker", *headings, *(text for text, _ in others.values()), "clips failed"], rows)
+        headings += [text for text, _ in others.values()]
+        return markdown(["tracker", *headings, "99th percentile (s)", "clips failed"], rows)
 
     def conditions(self) -> str:
         """Geometric mean errors of mice by what is changed, at the largest size."""
@@ -177,8 +187,9 @@ class Page:
         """What is left of differences between segments in hearts with an infarct."""
         found: dict[str, pd.Series] = {}
         for size, segments in self._segments.items():
-            table = recovery(segments)
+            table, radial = recovery(segments), recovery(columns.segments(self.at(size), is_radial=True))
             found |= {f"{what} at {size} px": table[what] for what in ("contrast", "spread")}
+            found |= {f"radial contrast at {size} px": radial["contrast"]}
         return self._table("tracker", found, lambda values, name: number(values.get(name, np.nan), 2))
 
     def qualities(self, species: str) -> str:
@@ -201,10 +212,12 @@ class Page:
             for less in EFFECTS
         ]
         least = (f"{100 * found.least:.0f} %" for found in self.power.values())
-        false = (f"{100 * found.false_order:.1f}" for found in self.power.values())
+        shared = self._power(power.DISEASE_EFFECT).values()
+        false, beside = ([f"{100 * found.false_order:.1f}" for found in of] for of in (self.power.values(), shared))
+        names = "**equal ones ordered**", f"**the same, diseases differ by {100 * power.DISEASE_EFFECT:.0f} %**"
         return markdown(
             ["error smaller by", *self.power],
-            [*rows, ["**shown in 80 %**", *least], ["**equal ones ordered**", *false]],
+            [*rows, ["**shown in 80 %**", *least], [names[0], *false], [names[1], *beside]],
         )
 
     def outside(self) -> str:
@@ -234,7 +247,11 @@ class Page:
     @cached_property
     def _segments(self) -> dict[int, pd.DataFrame]:
         """Segments of mice, by image size."""
-        return {size: columns.segments(self.mice[self.mice["size_px"] == size]) for size in self.sizes}
+        return {size: columns.segments(self.at(size)) for size in self.sizes}
+
+    def at(self, size: int) -> pd.DataFrame:
+        """Clips of realistic mice at an image size."""
+        return self.mice[self.mice["size_px"] == size]
 
     def _table(
         self, corner: str, found: dict[str, Any], text: Callable[[Any, str], str], names: Iterable[str] = ()
@@ -246,13 +263,11 @@ class Page:
 
 
 def with_cost(parts: pd.DataFrame, folder: Path = FOLDER) -> pd.DataFrame:
-    """Parts with a column `cpu_s`, the mean CPU time of a tracker in such clips, from the files beside them."""
+    """Parts with a column `cpu_s`, the CPU time of a tracker in a clip, from the files beside them."""
     tables = [pd.read_csv(file) for file in sorted(folder.glob("cost-*.csv"))]
     if "cpu_s" in parts or not tables:
         return parts
-    keys, cost = ["species", "view", "size_px", "tracker"], pd.concat(tables)
-    sums = cost.assign(cpu_s=cost["mean"] * cost["count"]).groupby(keys)[["cpu_s", "count"]].sum()
-    return parts.merge((sums["cpu_s"] / sums["count"]).rename("cpu_s").reset_index(), on=keys, how="left")
+    return parts.merge(pd.concat(tables), on=[*CLIP, "tracker"], how="left")
 
 
 def write(parts: pd.DataFrame, file: Path, split: str = "test") -> Path:

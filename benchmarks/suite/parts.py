@@ -1,4 +1,4 @@
-"""Parts of the suite: eight hearts each, whose scores are kept in benchmarks/results/suite2/part-KK.csv.gz.
+"""Parts of the suite: eight hearts each, whose scores are kept in benchmarks/results/suite3/part-KK.csv.gz.
 
 What a tracker costs differs from run to run; it is in a file of its own, cost-KK.csv, so that the scores of a part are
 the same bytes wherever it is made with the same instructions of the processor, packages and C library
@@ -26,8 +26,8 @@ from .columns import ABOUT, HASHES, IDENTITY, TEXT
 from .hearts import plan, suite_version
 from .scores import Row, heart_rows
 
-FOLDER = Path(__file__).parents[1] / "results/suite2"
-SCRATCH = Path("out/suite2")
+FOLDER = Path(__file__).parents[1] / "results/suite3"
+SCRATCH = Path("out/suite3")
 """Where the rows of each heart are kept, so that a part goes on where it was stopped, and the part `small`."""
 
 SMALL, SMALL_HEARTS = 0, 4
@@ -83,8 +83,8 @@ def make_part(part: int, jobs: int = 1, trackers: Path | None = None, say: Calla
     table = pd.DataFrame(rows).assign(part=part)
     if before is not None:
         _check_images(table, before)
-    cost = table.groupby(["species", "view", "size_px", "tracker"])["cpu_s"].agg(["count", "mean"]).reset_index()
-    files.write(folder / f"cost-{part:02d}{suffix}.csv", cost.to_csv(index=False, float_format="%.3g").encode())
+    cost = table[[*CLIP, "tracker", "cpu_s"]].to_csv(index=False, float_format="%.3g")
+    files.write(folder / f"cost-{part:02d}{suffix}.csv", cost.encode())
     files.write(path, packed(table.drop(columns="cpu_s")))
     return path
 

@@ -111,7 +111,7 @@ def _checked(result: Any, shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarra
             "0, not positions"
         )
     if quality is None:
-        return displacement, np.where(known, 1.0, np.nan)
+        return displacement, np.full(shape[:2], np.nan)
     quality = _real_array("quality", quality, shape[:2])
     if (np.abs(quality - 0.5) > 0.5 + QUALITY_TOLERANCE).any():
         low, high = np.nanmin(quality), np.nanmax(quality)
