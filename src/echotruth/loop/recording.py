@@ -1,20 +1,15 @@
 """A recorded cycle, read from a CSV file whose columns have their units in their names."""
 
-from __future__ import annotations
-
-import io
+import csv
 import re
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from echotruth.arrays import Floats
 from echotruth.units import UNITS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COLUMNS = {
     "time": ("ms", "s"),
@@ -75,48 +70,46 @@ def read(path: Path, purpose: str, needed: tuple[str, ...], optional: tuple[str,
     LoopError
         If the file cannot be read, lacks a column or gives a quantity twice, or a cell is no number.
     """
-    table = _table(path)
-    names = {quantity: _column(path, list(table), quantity) for quantity in (*needed, *optional)}
+    header, rows = _table(path)
+    names = {quantity: _column(path, header, quantity) for quantity in (*needed, *optional)}
     for quantity in needed:
         if not names[quantity]:
             choice = " or ".join(f"{quantity}_{unit}" for unit in COLUMNS[quantity])
             need = f"there is no column of the {quantity}, which {purpose} needs"
             raise LoopError(f"{path}: {need}; add one and name it {choice}.")
     names = {quantity: name for quantity, name in names.items() if name}
-    if len(table) < _MIN_ROWS:
-        raise LoopError(f"{path}: there are {len(table)} rows; a cycle needs {_MIN_ROWS} or more.")
+    if len(rows) < _MIN_ROWS:
+        raise LoopError(f"{path}: there are {len(rows)} rows; a cycle needs {_MIN_ROWS} or more.")
     columns = {
-        quantity: np.array([_number(f"{path}, line {line}", name, cell) for line, cell in table[name].items()])
+        quantity: np.array([_number(f"{path}, line {i}", name, row[header.index(name)]) for i, row in rows.items()])
         for quantity, name in names.items()
     }
     return Recording(path, names, columns)
 
 
-def _table(path: Path) -> pd.DataFrame:
-    """Cells of the file by the names of its columns; the index is the number of each line."""
-    import pandas as pd
-
+def _table(path: Path) -> tuple[list[str], dict[int, list[str]]]:
+    """Names of the columns of the file, and the cells of each row by the number of its line."""
     lines = {i: line for i, line in enumerate(_text(path), 1) if line.strip() and not line.startswith("#")}
     if not lines:
         raise LoopError(f"{path}: is empty; give a CSV file.")
     separator = next((mark for mark in "\t;" if mark in next(iter(lines.values()))), ",")
-    columns = range(1 + max(line.count(separator) for line in lines.values()))
-    text = io.StringIO("\n".join(lines.values()))
     try:
-        cells = pd.read_csv(text, sep=separator, header=None, names=columns, dtype=str, keep_default_na=False)
-    except pd.errors.ParserError as error:
+        cells = {i: next(csv.reader([line], delimiter=separator, strict=True)) for i, line in lines.items()}
+    except csv.Error as error:
         raise LoopError(f"{path}: is no table ({error}); give a CSV file.") from None
-    cells = cells.set_axis(list(lines)[: len(cells)]).apply(lambda column: column.str.strip())
+    cells = {i: [cell.strip() for cell in row] for i, row in cells.items()}
     # LabChart writes lines such as "ChannelTitle=", then rows of the time in seconds and the channels.
-    is_about = cells[0].str.endswith("=")
-    about, cells = cells[is_about].set_index(0).T, cells[~is_about]
+    about = {name: others for name, *others in cells.values() if name.endswith("=")}
+    rows = {i: row for i, row in cells.items() if not row[0].endswith("=")}
     if "ChannelTitle=" in about:
-        header = ["time_s", *(about["ChannelTitle="] + " (" + about.get("UnitName=", "") + ")")]
+        channels = zip_longest(about["ChannelTitle="], about.get("UnitName=", []), fillvalue="")
+        header = ["time_s", *(f"{title} ({unit})" for title, unit in channels)]
     else:
-        header, cells = cells[:1].squeeze("index"), cells[1:]
+        header = rows.pop(min(rows, default=0), [])
     if separator != ",":
-        cells = cells.replace(",", ".", regex=True)
-    return cells.set_axis(map(_standard_name, header), axis="columns")
+        rows = {i: [cell.replace(",", ".") for cell in row] for i, row in rows.items()}
+    missing = {i: [""] * (len(header) - len(row)) for i, row in rows.items()}
+    return [_standard_name(name) for name in header], {i: row + missing[i] for i, row in rows.items()}
 
 
 def _standard_name(name: str) -> str:
