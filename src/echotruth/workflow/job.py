@@ -5,6 +5,7 @@ function, and writes groups. A group is moved to its place when it is whole; a j
 """
 
 import argparse
+import gc
 import json
 import logging
 import sys
@@ -238,6 +239,7 @@ def _prepare(threads: int, place: str) -> None:
 
         guard_cache()
         numba.set_num_threads(max(1, min(threads, numba.config.NUMBA_NUM_THREADS)))  # type: ignore[attr-defined]
+    gc.freeze()  # the collector need not walk through all that was imported, each time anew
     logging.getLogger("numba").setLevel(logging.WARNING)
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format=f"{place}: %(message)s", force=True)
 
