@@ -48,7 +48,7 @@ class RigidMotion:
         return (positions - self.centre - self.shift[frame]) @ self.rotation[frame] + self.centre
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Heart:
     """A beating heart: a mesh and its displacement in every frame.
 

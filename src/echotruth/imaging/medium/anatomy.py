@@ -18,7 +18,7 @@ eye.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import pi
 
 import numpy as np
@@ -196,6 +196,12 @@ class Anatomy:
         length = RIGHT_ATRIAL_LENGTH * self.radius + thickness
         right = np.hypot((cos * x + sin * y - middle) / (half + thickness), (cos * y - sin * x) / length)
         return np.cbrt(np.stack([left, right]) ** 3 + np.abs(z / height) ** 3)
+
+
+@lru_cache(maxsize=1)
+def anatomy_of(heart: Heart) -> Anatomy:
+    """Anatomy around a heart, made once for all that lies there: it samples the whole epicardium."""
+    return Anatomy(heart)
 
 
 def chest_wall_depth(heart: Heart, plane: Plane, start: float) -> float:

@@ -1,6 +1,7 @@
 """Filling of the left ventricle, frame by frame: how far it is emptied, and how far its valves are open."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,6 +18,7 @@ HALF_OPEN = 0.35
 """How far the mitral valve is open in diastasis, between two waves of filling; by eye, as in a human clip."""
 
 
+@lru_cache(maxsize=1)
 def volumes(heart: Heart) -> Floats:
     """Volume of the cavity in every frame, (frame,), m^3."""
     cavity = Cavity(heart.endo)

@@ -25,6 +25,7 @@ from echotruth.imaging.medium.anatomy import (
     Anatomy,
     Place,
     above_lid,
+    anatomy_of,
     chest_wall_depth,
     strata_dB,
 )
@@ -95,7 +96,7 @@ class SurroundingsMotion:
 
     def _with_neighbours(self, decay_length: float, tissue: NDArray[np.uint8]) -> tuple[Floats, Floats]:
         """Share (n, 1) of the motion of the epicardium, and motion (n, 3), m, towards the septum at end-systole."""
-        anatomy = Anatomy(self._heart)
+        anatomy = anatomy_of(self._heart)
         place = anatomy.place(self._position)
         share = np.exp(-np.maximum(place.distance - place.gap - place.wall, 0) / decay_length)
         inward = -RIGHT_SHORTENING * (share * np.minimum(place.distance, place.gap))[:, None] * place.outward
@@ -282,7 +283,7 @@ def tissues(config: Config, heart: Heart, plane: Plane, position: Floats) -> tup
     tissue, level = np.zeros(len(position), np.uint8), np.full(len(position), _decibels(realism.surroundings.level_dB))
     if all(value is None for value in realism.neighbours.around.values()):
         return tissue, 10 ** (level / 10)
-    anatomy = Anatomy(heart)
+    anatomy = anatomy_of(heart)
     place = anatomy.place(position)
     _set_lung(config, plane, (tissue, level), place, anatomy.radius)
     _set_posterior(config, plane, (tissue, level), anatomy, position)

@@ -20,7 +20,7 @@ from echotruth.arrays import Floats
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium import arc
-from echotruth.imaging.medium.anatomy import RIGHT_ATRIUM, Anatomy
+from echotruth.imaging.medium.anatomy import RIGHT_ATRIUM, anatomy_of
 from echotruth.imaging.medium.annulus import box_of
 from echotruth.imaging.medium.body import Scene
 from echotruth.imaging.medium.borders import border_amplitude, border_density
@@ -49,7 +49,7 @@ class TricuspidValve(ChamberValve):
     shut, turn, open_ = atan2(TENTING, 0.5), TURN, OPEN
 
     def __init__(self, heart: Heart, between: Sequence[float] = ()) -> None:
-        anatomy, angle = Anatomy(heart), AZIMUTH + RIGHT_ATRIUM
+        anatomy, angle = anatomy_of(heart), AZIMUTH + RIGHT_ATRIUM
         distance, radius = anatomy.right_atrium
         middle = distance * np.array([np.cos(RIGHT_ATRIUM), np.sin(RIGHT_ATRIUM), 0.0])
         around = radius * np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
