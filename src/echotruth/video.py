@@ -11,7 +11,14 @@ QUALITY = 12
 """Constant rate factor of x264: grey levels of the default heart's wall err by 2.3 (RMS), 1 % by more than 7."""
 
 
-def write(path: Path, frames: NDArray[np.uint8], rate: float, quality: int = QUALITY, comment: str = "") -> None:
+def write(
+    path: Path,
+    frames: NDArray[np.uint8],
+    rate: float,
+    quality: int = QUALITY,
+    comment: str = "",
+    preset: str = "medium",
+) -> None:
     """Write an MP4; the same frames give the same bytes.
 
     A side of an odd number of pixels gets one more, black, at the right and the bottom, which H.264 needs.
@@ -27,6 +34,8 @@ def write(path: Path, frames: NDArray[np.uint8], rate: float, quality: int = QUA
         Constant rate factor; the less, the better.
     comment : str
         Of the file.
+    preset : str
+        Of x264: how long it looks for what is alike in other frames.
 
     Raises
     ------
@@ -48,7 +57,7 @@ def write(path: Path, frames: NDArray[np.uint8], rate: float, quality: int = QUA
         codec="libx264",
         macro_block_size=2,
         ffmpeg_log_level="quiet",
-        output_params=["-crf", str(quality), *same_twice, "-metadata", f"comment={comment}"],
+        output_params=["-crf", str(quality), "-preset", preset, *same_twice, "-metadata", f"comment={comment}"],
     )
     video.send(None)
     with suppress(OSError):  # of a pipe to a process that has ended, in many lines

@@ -171,7 +171,8 @@ class Figures:
         self._film(self.frames(HEIGHT))
 
     def _film(self, frames: NDArray[np.uint8]) -> None:
-        video.write(self.folder / "clip.mp4", np.concatenate([frames] * BEATS), FRAME_RATE, quality=20)
+        repeated = np.concatenate([frames] * BEATS)
+        video.write(self.folder / "clip.mp4", repeated, FRAME_RATE, quality=20, preset="veryfast")
 
     def frames(self, height: int) -> NDArray[np.uint8]:
         """Frames of the clip beside its truth, of a height, px."""
