@@ -342,9 +342,11 @@ class Equilibrium:
         volumetric_error = norm(volumetric) / np.sqrt(len(volumetric))
         return Residual(internal - external, volumetric, volume, target.slope, *errors, volumetric_error)
 
-    def _right_unit_load(self, nodes: Floats) -> Floats:
+    def _right_unit_load(self, nodes: Floats) -> Floats | float:
         """q dV_right/du (n_equations,): the load on the right endocardium of a unit pressure in the left ventricle."""
         facets = self.mesh.right_endo
+        if not len(facets):
+            return 0.0
         gradient = self.right_pressure_ratio * cavity.volume_gradient(nodes - self._right_origin, facets)
         return self.assembly.vector(self.assembly.rotate(facets, gradient), RIGHT_ENDO)
 
