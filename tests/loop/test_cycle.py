@@ -1,5 +1,7 @@
 """The shipped cycles, the columns of the prescribed quantities, the sampling, and the errors about invalid files."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -106,6 +108,11 @@ def test_an_invalid_loop_is_refused_in_one_sentence(tmp_path, rows, message):
     assert message in str(caught.value)
     assert "loop.csv" in str(caught.value)
     assert str(caught.value).endswith(".")
+
+
+def test_a_loop_is_read_without_pandas_which_a_job_would_load_for_nothing_else():
+    code = "import sys, echotruth.config as c, echotruth.loop.cycle as cycle; cycle.read_loop(c.Loop())"
+    subprocess.run([sys.executable, "-c", f"{code}; assert 'pandas' not in sys.modules"], check=True)
 
 
 def test_every_unit_of_the_field_gives_the_same_cycle(tmp_path):
