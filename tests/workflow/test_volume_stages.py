@@ -125,6 +125,12 @@ def test_what_reads_slices_refuses_volumes_in_one_sentence(made):
         opened(made)
 
 
+def test_volume_without_wall_ends_the_run_in_a_sentence(tmp_path):
+    inside = configured("half", volume={"size": [8, 8, 8], "field_mm": [1, 1, 1]})
+    with pytest.raises(SystemExit, match=r"^phantom: There is no wall in the volume: volume\.field_mm = .*\.$"):
+        finish(tmp_path / "tiny", inside, solved)
+
+
 def test_tracker_of_slices_is_refused_before_a_run():
     config = et.configure(configured(), tracking={"trackers": {"flow": {"method": "dis"}}})
     (concern,) = concerns(config)

@@ -15,6 +15,10 @@ BEATS_PER_BREATH = 4.5
 """Heart rate 241 M^-0.25 over respiratory rate 53.5 M^-0.26, M the mass of a mammal (Stahl 1967)."""
 
 
+class NoWall(ValueError):
+    """Raised if a view does not show the wall."""
+
+
 @dataclass(frozen=True)
 class Plane:
     """An imaging plane in the heart frame.

@@ -11,6 +11,8 @@ from echotruth.imaging.medium.body import Arrays
 from echotruth.imaging.recorder import quantise
 from echotruth.imaging.rf.row_column import RowColumn
 from echotruth.imaging.sequence import Sequence
+from echotruth.imaging.truth import wall_mask
+from echotruth.imaging.view import NoWall
 
 
 class VolumeSequence(Sequence):
@@ -24,6 +26,20 @@ class VolumeSequence(Sequence):
     @property
     def _matrix(self) -> RowColumn:
         return self.scanner.matrix
+
+    @cached_property
+    def wall(self) -> NDArray[np.bool_]:
+        """Voxels in the wall at end-diastole, (axial, elevation, lateral)."""
+        scanner, scene = self.scanner, self._scene
+        return wall_mask(scene.heart, scene.plane, scanner.axial, scanner.lateral, scanner.elevation)
+
+    def scatterers(self) -> Arrays:
+        """Draw the scatterers of the view, as :meth:`.Sequence.scatterers`; :exc:`.NoWall` if no voxel is in the wall."""
+        if not self.wall.any():
+            config = self._scene.config
+            where = f"volume.field_mm = {list(config.volume.field_mm)} about rf.focus_mm = {config.rf.focus_mm:g}"
+            raise NoWall(f"There is no wall in the volume: {where} and the offset of the view must suit the heart.")
+        return super().scatterers()
 
     def volumes(self, scatterers: Arrays) -> dict[str, NDArray[Any]]:
         """Image all frames.

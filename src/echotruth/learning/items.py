@@ -67,8 +67,9 @@ class Items(Sequence[Item]):
         self.group = config.image_names[config.image_sizes.index(self.size)]
         """Last part of the names of groups of that size."""
         self.frames = config.loop.frames
-        self.spacing = config.bmode.field_of_view_mm * mm / self.size
-        """Distance of pixel centres, m; of volumes see :class:`VolumePairs`."""
+        voxel, pixel = np.array(config.volume.voxel_mm)[[2, 0, 1]], config.bmode.field_of_view_mm / self.size
+        self.spacing: Any = (voxel if self.has_volumes else pixel) * mm
+        """Distance of pixel centres, m; of volumes (3,): lateral, axial and elevation side of a voxel."""
         given = cases.index if hasattr(cases, "columns") else cases
         ids = _complete(self.repository) if given is None else _listed(given)
         names = list(config.views) if views is None else _listed(views)

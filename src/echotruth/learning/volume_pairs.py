@@ -10,7 +10,6 @@ from echotruth.imaging.flow import STEPS
 from echotruth.imaging.truth import PixelTruth
 from echotruth.imaging.view import Plane, before_probe
 from echotruth.learning.items import Item, Items, Place
-from echotruth.units import mm
 
 NEXT = list(STEPS).index("next")
 
@@ -38,7 +37,7 @@ class VolumePairs(Items):
     >>> from echotruth.learning import VolumePairs
     >>> pairs = VolumePairs("out/volumes")  # doctest: +SKIP
     >>> pairs[0]["flow"].shape  # doctest: +SKIP
-    (3, 128, 120, 120)
+    (3, 144, 128, 96)
     """
 
     has_volumes = True
@@ -56,7 +55,7 @@ class VolumePairs(Items):
         (axial, elevation, lateral), (heart, plane) = voxel_centres(config), self._before_probe(place)
         truth = PixelTruth(heart, plane, axial, lateral, elevation=elevation, frames=[within])
         forth = np.ascontiguousarray(np.moveaxis(truth["flow"][0, NEXT], -1, 0))
-        wall, sides = np.isfinite(forth[0]), (np.array(config.volume.voxel_mm)[[2, 0, 1]] * mm).astype(np.float32)
+        wall, sides = np.isfinite(forth[0]), self.spacing.astype(np.float32)
         flow = np.where(wall, forth, np.float32(0))
         return {
             "image": self.image(place, slice(within, within + 2)),

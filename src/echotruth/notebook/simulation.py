@@ -15,7 +15,6 @@ from echotruth.config import Config, Probe, View
 from echotruth.config.building import Source, configure
 from echotruth.config.diagnosis import bounds_of
 from echotruth.heart import Heart
-from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.bmode import bmode_clip, clip_gain, pixel_centres, time_gain_compensation, volume_images
 from echotruth.imaging.medium.tissue_images import TissueImages
 from echotruth.imaging.sequence import Sequence
@@ -170,17 +169,12 @@ def image(
     case, (moving, plane) = Case("heart", {}, config), before_probe(heart, config, name)
     random, is_closed = partial(generator, case, name), config.views[name].motion.is_closed
     if plane.is_volume:
-        axial, elevation, lateral = voxel_centres(config)
-        mask = wall_mask(moving, plane, axial, lateral, elevation)
-        if not mask.any():
-            where = f"volume.field_mm = {list(config.volume.field_mm)} about rf.focus_mm = {config.rf.focus_mm:g}"
-            raise ValueError(f"There is no wall in the volume: {where} and the offset of the view must suit the heart.")
+        volumes = VolumeSequence(config, moving, plane, random)
         with progress_line("image", progress):
-            volumes = VolumeSequence(config, moving, plane, random)
             found = volumes.volumes(volumes.scatterers())
-        gain = time_gain_compensation(config.probe, config.bmode, axial)
+        gain = time_gain_compensation(config.probe, config.bmode, volumes.scanner.axial)
         volume = volume_images(found["volumes"], found["volumes_step"], gain, config.bmode, is_closed)
-        return volume_dataset(case, name, volume, mask, source_of(heart, plane))
+        return volume_dataset(case, name, volume, volumes.wall, source_of(heart, plane))
     sequence = Sequence(config, moving, plane, random)
     with progress_line("image", progress):
         lines, range_ = sequence.lines(sequence.scatterers()), sequence.scanner.range

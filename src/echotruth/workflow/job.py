@@ -22,7 +22,7 @@ from echotruth.cases.case import Case
 from echotruth.config import Config, View
 from echotruth.config.diagnosis import bounds_of
 from echotruth.heart import Heart
-from echotruth.imaging.view import Plane, before_probe
+from echotruth.imaging.view import NoWall, Plane, before_probe
 from echotruth.repository import group, metadata, schema
 from echotruth.repository.coordinates import coordinates_of
 from echotruth.repository.places import OF_HEART, groups_of, place, repository_folder
@@ -219,7 +219,7 @@ def run(job: Job, work: Work) -> None:
         # The rounding of BLAS sums depends on the number of threads, but results must not.
         with threadpool_limits(1):
             return job.write(work(job))
-    except (group.NotWritten, FileNotFoundError) as error:
+    except (group.NotWritten, FileNotFoundError, NoWall) as error:
         sys.exit(f"{job.stage}: {error}")
     except OSError as error:
         remedy = "the folder must be writable, on a disk that has space and no errors"

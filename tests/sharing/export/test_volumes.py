@@ -83,6 +83,7 @@ def test_paths_of_points_begin_in_the_wall_and_are_shifted(made, exported):
 def test_pairs_have_the_shift_from_one_volume_to_the_next(made):
     pairs = VolumePairs(made.folder)
     assert len(pairs) == 2
+    np.testing.assert_allclose(pairs.spacing, [6.9e-3 / 18, 6.9e-3 / 24, 8.6e-3 / 24])
     for pair, share in zip(pairs, (1, -0.5), strict=True):
         wall = pair["wall"]
         labels = made.read("truth/volume/labels", "heart", "whole", pair["frame"], 0)
