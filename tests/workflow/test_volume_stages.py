@@ -16,6 +16,7 @@ from echotruth.repository.check import check
 from echotruth.repository.group import part
 from echotruth.repository.places import group_of
 from echotruth.viewer.server import opened
+from echotruth.workflow.added_tracker import EvaluationError, prepare
 from echotruth.workflow.concerns import concerns
 
 
@@ -131,11 +132,14 @@ def test_volume_without_wall_ends_the_run_in_a_sentence(tmp_path):
         finish(tmp_path / "tiny", inside, solved)
 
 
-def test_tracker_of_slices_is_refused_before_a_run():
-    config = et.configure(configured(), tracking={"trackers": {"flow": {"method": "dis"}}})
+@pytest.mark.parametrize("method", ["dis", "bspline_cnn"])
+def test_tracker_of_slices_is_refused_before_a_run_and_beside_it(made, method):
+    config = et.configure(configured(), tracking={"trackers": {"flow": {"method": method}}})
     (concern,) = concerns(config)
     assert concern.is_absurd and concern.text.startswith("tracking.trackers.flow.method tracks slices")
     assert list(configured().tracking.trackers) == ["bspline_dic"]
+    with pytest.raises(EvaluationError, match=r"^flow tracks slices: volumes need bspline_dic"):
+        prepare(et.Repository(made), "flow", {"method": method})
 
 
 def test_volume_that_does_not_hold_the_heart_is_told_before_a_run():

@@ -22,6 +22,7 @@ from pydantic import TypeAdapter, ValidationError
 from echotruth import files
 from echotruth.config import shipped
 from echotruth.config.loading import validate
+from echotruth.config.tracking import VOLUMETRIC
 from echotruth.evaluation.leaderboard import rows_of
 from echotruth.evaluation.tracker_options import EvaluationError
 from echotruth.repository.places import JobPlace
@@ -172,7 +173,7 @@ def prepare(repository: Repository, name: str, values: dict[str, Any]) -> AddedT
     Raises
     ------
     EvaluationError
-        If the configuration has a tracker of that name, or the name is invalid.
+        If the configuration has a tracker of that name, the name is invalid, or it tracks slices in place of volumes.
     ConfigError
         If the settings are invalid.
     """
@@ -187,8 +188,10 @@ def prepare(repository: Repository, name: str, values: dict[str, Any]) -> AddedT
         raise EvaluationError(f"{taken}: give this one another name with --name")
     tracking = config.tracking.model_dump()
     together = tracking | {"trackers": tracking["trackers"] | {name: values}}
-    checked = validate(config.model_dump() | {"tracking": together}, f"tracker {name}")
-    return AddedTracker(repository, name, checked.tracking.trackers[name])
+    settings = validate(config.model_dump() | {"tracking": together}, f"tracker {name}").tracking.trackers[name]
+    if config.has_volumes and type(settings) not in VOLUMETRIC:
+        raise EvaluationError(f"{name} tracks slices: volumes need bspline_dic, or a function or program")
+    return AddedTracker(repository, name, settings)
 
 
 def format_row(row: Row) -> str:

@@ -44,7 +44,7 @@ def _of_the_images(config: Config) -> Iterator[Concern]:
 
 def _of_the_volumes(config: Config) -> Iterator[Concern]:
     for name, tracker in config.tracking.trackers.items():
-        if not isinstance(tracker, VOLUMETRIC):
+        if type(tracker) not in VOLUMETRIC:
             remedy = "use bspline_dic, or a function or program"
             yield Concern(f"tracking.trackers.{name}.method tracks slices, and the views are volumes: {remedy}", True)
     if config.geometry.file is not None or config.motion.kind == "file":

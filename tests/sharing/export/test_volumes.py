@@ -1,5 +1,7 @@
 """Volumes in files and in pairs to learn from: their places, and the motion, which is a shift."""
 
+import re
+from contextlib import chdir
 from itertools import product
 
 import numpy as np
@@ -12,6 +14,8 @@ import echotruth as et
 from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.learning import Clips, VolumePairs
 from echotruth.sharing.export import Export, ExportError
+from echotruth.sharing.release import release
+from echotruth.sharing.release.attribution import Attribution
 
 STEP = 0.3e-3 / 256
 
@@ -94,6 +98,17 @@ def test_pairs_have_the_shift_from_one_volume_to_the_next(made):
         np.testing.assert_allclose(pair["flow"] * pair["spacing"][:, None, None, None], pair["flow_m"], atol=1e-9)
         grey = made.clip()["image"].values[pair["frame"] : pair["frame"] + 2]
         np.testing.assert_allclose(pair["image"], grey / 255, atol=1e-6)
+
+
+def test_card_of_a_release_has_code_that_reads_volumes(made, tmp_path):
+    release(made, tmp_path / "files", Attribution())
+    text = (tmp_path / "files/README.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    names = {}
+    with chdir(tmp_path / "files"):
+        exec(code.replace('["heart"])', '["heart"], to="../here")'), names)
+    np.testing.assert_allclose(names["truth"]["displacement"].max(("axial", "elevation", "lateral")), SHIFT, atol=STEP)
+    assert "every voxel" in text and "plane of a view" not in text
 
 
 def test_what_holds_no_volumes_or_no_slices_is_refused(made, known):
