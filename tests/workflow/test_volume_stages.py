@@ -1,5 +1,7 @@
 """A repository of volumes holds what the functions make in memory, and is the same however it was made."""
 
+import re
+
 import numpy as np
 import pytest
 import yaml
@@ -148,3 +150,6 @@ def test_volume_that_does_not_hold_the_heart_is_told_before_a_run():
         return [concern.is_absurd for concern in concerns(configured(views=views))]
 
     assert (told(0.5), told(1.5), told(-7.0)) == ([], [False], [True])
+    (concern,) = concerns(configured(volume={"field_mm": [4.0, 8.6, 6.9]}))
+    (needed,) = re.findall(r"use (\S+) or more for the axial side$", concern.text)
+    assert not list(concerns(configured(volume={"field_mm": [float(needed), 8.6, 6.9]})))

@@ -34,7 +34,7 @@ class VolumeSequence(Sequence):
         return wall_mask(scene.heart, scene.plane, scanner.axial, scanner.lateral, scanner.elevation)
 
     def scatterers(self) -> Arrays:
-        """Draw the scatterers of the view, as :meth:`.Sequence.scatterers`; :exc:`.NoWall` if no voxel is in the wall."""
+        """As of :meth:`.Sequence.scatterers`; :exc:`.NoWall` is raised if no voxel is in the wall."""
         if not self.wall.any():
             config = self._scene.config
             where = f"volume.field_mm = {list(config.volume.field_mm)} about rf.focus_mm = {config.rf.focus_mm:g}"

@@ -1,6 +1,7 @@
 """What speaks against a run: its images cannot show the heart or its strain, or a file holds no wall."""
 
 from collections.abc import Iterator
+from math import ceil
 from typing import NamedTuple
 
 from echotruth.config import Config
@@ -51,15 +52,15 @@ def _of_the_volumes(config: Config) -> Iterator[Concern]:
         return
     (depth, _, width), radius = config.volume.field_mm, config.geometry.outer_radius_mm()
     for name, view in config.views.items():
-        for key, side in (("axial_mm", depth), ("lateral_mm", width)):
-            offset = abs(getattr(view.offset, key))
+        for along, side in (("axial", depth), ("lateral", width)):
+            offset = abs(getattr(view.offset, f"{along}_mm"))
             if offset + radius > side / 2:
                 is_beside = offset - radius >= side / 2
-                text = (
-                    f"the heart, {2 * radius:.3g} mm wide, {'is beside' if is_beside else 'reaches beyond'} the volume"
-                )
-                remedy = f"use a smaller offset, or a side of more than {side:g} in volume.field_mm"
-                yield Concern(f"views.{name}.offset.{key}: {text}: {remedy}", is_beside)
+                where = "is beside" if is_beside else "reaches beyond"
+                text = f"the heart, {2 * radius:.3g} mm wide, {where} the volume of the view {name}"
+                remedy = f"use {ceil(20 * (offset + radius)) / 10:g} or more for the {along} side"
+                remedy += f", or a smaller views.{name}.offset.{along}_mm" if offset else ""
+                yield Concern(f"volume.field_mm = {list(config.volume.field_mm)}: {text}: {remedy}", is_beside)
 
 
 def _of_the_file(config: Config) -> Iterator[Concern]:
