@@ -116,13 +116,13 @@ def squares(path: Path, speckle: float, shape: tuple[float, ...]) -> Squares:
 
 
 ERRORS = {
-    "phase_correlation_ED": ErrorModel(0.254, 2.65, 0.0, 0.0, 0.351, 0.0, 0.0),
-    "phase_correlation": ErrorModel(0.0186, 50.0, 0.314, 0.314, 0.0463, 0.0, 0.0),
-    "window_deformation": ErrorModel(0.236, 1.26, 0.204, 0.256, 0.0389, 0.0, 0.0),
-    "dis": ErrorModel(0.345, 0.936, 0.172, 0.21, 0.0966, 0.0, 0.0),
-    "dis_fine": ErrorModel(0.335, 0.675, 0.207, 0.229, 0.0663, 0.0, 0.0),
-    "bspline_dic": ErrorModel(0.172, 0.559, 0.259, 0.284, 0.0321, 0.196, 0.0),
-    "bspline_cnn": ErrorModel(0.0798, 0.202, 0.15, 0.19, 0.0, 0.113, 0.903),
+    "phase_correlation_ED": ErrorModel(0.127, 50.0, 0.0, 0.0, 0.193, 0.0, 0.0),
+    "phase_correlation": ErrorModel(0.0673, 50.0, 0.274, 0.164, 0.0383, 0.0, 0.0),
+    "window_deformation": ErrorModel(0.15, 49.5, 0.178, 0.299, 0.054, 0.0, 0.0),
+    "dis": ErrorModel(0.162, 1.72, 0.185, 0.333, 0.104, 0.0, 0.0),
+    "dis_fine": ErrorModel(0.139, 1.94, 0.184, 0.336, 0.07, 0.0, 0.0),
+    "bspline_dic": ErrorModel(0.153, 0.464, 0.205, 0.297, 0.0326, 0.203, 0.0),
+    "bspline_cnn": ErrorModel(0.12, 0.183, 0.13, 0.198, 0.0, 0.117, 0.84),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`.
 That of `bspline_dic` is not fitted on volumes, where it is used too."""
