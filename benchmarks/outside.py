@@ -32,7 +32,7 @@ from threadpoolctl import threadpool_limits
 
 import echotruth as et
 from benchmarks.parallel import in_processes
-from benchmarks.suite.hearts import SUBSET_MM, TRACKERS, WINDOW_MM, configured
+from benchmarks.suite.hearts import LENGTHS_MM, TRACKERS, configured
 from benchmarks.suite.scores import view_clips
 from echotruth.evaluation.point_tracks import SIDE
 from echotruth.evaluation.reliability import WITHIN
@@ -258,7 +258,10 @@ def ring_rows(names: Row, frames: NDArray[np.uint8], centre: Floats, motion: Pol
     drawn = et.Wall(*(centre + radius / STEP * circle for radius in WALL), VIEW)
     es, rows = len(frames) - 1, []
     scale = np.diff(WALL).item() / (REFERENCE_WALL_MM * mm)  # over a mouse, of which the lengths of the suite are
-    lengths = {"corrected": {"window_mm": scale * WINDOW_MM}, "affine_dic": {"subset_mm": scale * SUBSET_MM}}
+    lengths = {
+        name: {key: scale * value for key, value in given.get("options", given).items()}
+        for name, given in LENGTHS_MM.items()
+    }
     for tracker, given in TRACKERS.items():
         options = {
             key: value for key, value in (given | lengths.get(tracker, {})).items() if key not in ("method", "track")

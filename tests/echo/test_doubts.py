@@ -16,10 +16,11 @@ def notes(ring, frames=None, tracker="dis"):
 
 
 def moving(displaced):
-    """Tracker that moves points by a function of their place about the centre, px, once there and back."""
+    """Tracker that moves points by a function of their place about the centre, px, once there and back, and is sure."""
 
     def track(frames, points, *_):
-        return np.sin(np.pi * np.arange(FRAMES) / FRAMES)[:, None, None] ** 2 * displaced(points - CENTRE)
+        moved = np.sin(np.pi * np.arange(FRAMES) / FRAMES)[:, None, None] ** 2 * displaced(points - CENTRE)
+        return moved, np.ones(moved.shape[:2])
 
     return track
 
@@ -60,7 +61,7 @@ def test_noise_is_told_from_a_ring_in_noise(ring):
 def test_motion_that_the_tracker_is_not_sure_of_or_says_nothing_of_is_told(ring):
     def sure(quality):
         def track(frames, points, *arguments):
-            moved = moving(evenly)(frames, points, *arguments)
+            moved, _ = moving(evenly)(frames, points, *arguments)
             return moved, np.full(moved.shape[:2], quality)
 
         return track
