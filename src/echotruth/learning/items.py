@@ -8,6 +8,8 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.heart import Heart
+from echotruth.imaging.view import Plane, before_probe
 from echotruth.repository.choice import Names, image_size, require_known
 from echotruth.repository.reader import Repository
 from echotruth.units import mm
@@ -56,6 +58,7 @@ class Items(Sequence[Item]):
     """Stages of which the groups of a clip are read."""
     has_volumes = False
     """Whether items are of volumes, and not of slices."""
+    _kept: tuple[str, Heart] | None = None
 
     def __init__(self, repository: str | Path, cases: Any = None, views: Names = None, size: int | None = None) -> None:
         self.repository = Repository(repository)
@@ -85,6 +88,9 @@ class Items(Sequence[Item]):
                         "finish the run, or choose cases of status complete."
                     )
         return places
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_kept": None}
 
     @property
     def per_clip(self) -> int:
@@ -124,6 +130,13 @@ class Items(Sequence[Item]):
     def truth(self, place: Place, name: str, *index: Any) -> NDArray[Any]:
         """Part of an array of the truth of a clip."""
         return self.repository.read(f"truth/{self.group}/{name}", *place, *index)
+
+    def before_probe(self, place: Place) -> tuple[Heart, Plane]:
+        """The heart as it moves before the probe, and the plane of a view; the last heart is kept, for its views."""
+        case, view = place
+        if self._kept is None or self._kept[0] != case:
+            self._kept = case, self.repository.heart(case)
+        return before_probe(self._kept[1], self.repository.case(case).config, view)
 
     def time(self, place: Place) -> NDArray[np.float32]:
         """Time of each frame since end-diastole, (frame,), s."""

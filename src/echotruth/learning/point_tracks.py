@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from echotruth.arrays import Floats
-from echotruth.heart import Heart
 from echotruth.imaging.bmode import pixel_centres
 from echotruth.imaging.labels import LABELS
 from echotruth.imaging.tracks import follow, visible
-from echotruth.imaging.view import before_probe
 from echotruth.learning.items import Item, Items, Place
 from echotruth.repository.choice import Names
 
@@ -65,10 +63,6 @@ class PointTracks(Items):
         if start is not None and not 0 <= start < self.frames:
             raise ValueError(f"start = {start}: give a frame from 0 to {self.frames - 1}.")
         self.points, self.start, self.seed = points, start, seed
-        self._heart: tuple[str, Heart] | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_heart": None}
 
     def item(self, place: Place, within: int) -> Item:
         case, view = place
@@ -91,13 +85,5 @@ class PointTracks(Items):
 
     def _followed(self, place: Place, start: int, points: Floats) -> Floats:
         """Positions of the tissue in all frames, (frame, point, 3), m, that is at points (n, 2) of the image in one."""
-        case, view = place
-        heart, config = self._heart_of(case), self.repository.case(case).config
-        heart, plane = before_probe(heart, config, view)
+        heart, plane = self.before_probe(place)
         return follow(heart.nodes + heart.displacement, heart.cells, plane, points, start)
-
-    def _heart_of(self, case: str) -> Heart:
-        """A heart; the last is kept, for its other views."""
-        if self._heart is None or self._heart[0] != case:
-            self._heart = case, self.repository.heart(case)
-        return self._heart[1]

@@ -1,14 +1,10 @@
 """Pairs of volumes in succession with the motion between them."""
 
-from typing import Any
-
 import numpy as np
 
-from echotruth.heart import Heart
 from echotruth.imaging.beamforming.scan import voxel_centres
 from echotruth.imaging.flow import STEPS
 from echotruth.imaging.truth import PixelTruth
-from echotruth.imaging.view import Plane, before_probe
 from echotruth.learning.items import Item, Items, Place
 
 NEXT = list(STEPS).index("next")
@@ -41,10 +37,6 @@ class VolumePairs(Items):
     """
 
     has_volumes = True
-    _kept: tuple[Place, Heart, Plane] | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_kept": None}
 
     @property
     def per_clip(self) -> int:
@@ -52,7 +44,7 @@ class VolumePairs(Items):
 
     def item(self, place: Place, within: int) -> Item:
         config = self.repository.case(place[0]).config
-        (axial, elevation, lateral), (heart, plane) = voxel_centres(config), self._before_probe(place)
+        (axial, elevation, lateral), (heart, plane) = voxel_centres(config), self.before_probe(place)
         truth = PixelTruth(heart, plane, axial, lateral, elevation=elevation, frames=[within])
         forth = np.ascontiguousarray(np.moveaxis(truth["flow"][0, NEXT], -1, 0))
         wall, sides = np.isfinite(forth[0]), self.spacing.astype(np.float32)
@@ -65,11 +57,3 @@ class VolumePairs(Items):
             "flow_m": flow,
             "wall": wall,
         }
-
-    def _before_probe(self, place: Place) -> tuple[Heart, Plane]:
-        """The heart as it moves before the probe, and the plane of a view; the last are kept."""
-        if self._kept is None or self._kept[0] != place:
-            case, view = place
-            heart = self.repository.heart(case)
-            self._kept = place, *before_probe(heart, self.repository.case(case).config, view)
-        return self._kept[1:]

@@ -121,7 +121,7 @@ class Export:
     output: Path | None = None
 
     def __post_init__(self) -> None:
-        has, name = BOTH[self.repository.config.has_volumes], self.repository.config.name
+        has, name = "volumes" if self.repository.config.has_volumes else "slices", self.repository.config.name
         if has not in FORMATS[self.format].of:
             able = ", ".join(key for key, form in FORMATS.items() if has in form.of)
             raise ExportError(f"--format {self.format}: {name} has {has}, for which there are {able}")
