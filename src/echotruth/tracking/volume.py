@@ -11,6 +11,9 @@ J, its robust weights, templates, and both ways around the cycle are the same. T
 - it is not looked for shadows.
 """
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from scipy import ndimage
 
@@ -28,6 +31,21 @@ KNOTS = 0.8
 """Knot spacing over that of the cubic field of flat images: hat functions are narrower than cubic ones."""
 BLUR_REACH = 3
 """Standard deviations at which a blur is cut off."""
+
+
+class Amplitudes(Sequence[np.ndarray]):
+    """Amplitudes of each volume of a clip, made whenever they are asked for: all would take four times its memory."""
+
+    def __init__(self, frames: np.ndarray, decibels: float):
+        self._frames, self._decibels = frames if frames.dtype == np.uint8 else grey_levels(frames), decibels
+
+    def __len__(self) -> int:
+        return len(self._frames)
+
+    def __getitem__(self, frame: Any) -> Any:
+        volume = self._frames[frame]
+        grey = grey_levels(volume) if volume.dtype == np.uint8 else np.nan_to_num(volume)
+        return decompress(grey, self._decibels)
 
 
 class VolumeTracker(WallTracker):
@@ -49,16 +67,17 @@ def follow_volume(clip: TrackerInput, settings: BsplineDic) -> BothWays:
     region = volume_region(clip.mask, clip.ratio, KNOTS * knots, margin, settings.transmural_scale)
     points, decibels = clip.points * clip.ratio, settings.dynamic_range_dB
     ncc = NormalizedCrossCorrelation(region.positions, region.inside, points, 2 * knots, decibels)
-    grey = grey_levels(clip.frames)
-    typical = rms(decompress(np.nan_to_num(grey[0][clip.mask]), decibels))
+    amplitudes = Amplitudes(clip.frames, decibels)
+    typical = rms(amplitudes[0][clip.mask])
 
-    def prepare(frame: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        amplitude = decompress(np.nan_to_num(frame), decibels)
-        even = even_gain(amplitude, settings.gain_mm * mm / spacing, typical) if settings.gain_mm else amplitude
+    def prepare(frame: int) -> tuple[np.ndarray, np.ndarray]:
+        even = amplitudes[frame]
+        if settings.gain_mm:
+            even = even_gain(even, settings.gain_mm * mm / spacing, typical)
         blurred = ndimage.gaussian_filter(even, COARSE_BLUR * settings.knots_mm * mm / spacing, truncate=BLUR_REACH)
-        return coefficients(even), coefficients(blurred), amplitude
+        return coefficients(even), coefficients(blurred)
 
-    images, blurred, amplitudes = map(list, zip(*each(prepare, list(grey)), strict=True))
+    images, blurred = map(list, zip(*each(prepare, range(len(amplitudes))), strict=True))
     settings = settings.model_copy(update={"smoothness": settings.smoothness or SMOOTHNESS})
     tracker = VolumeTracker(region, ncc, None, np.empty(0), 1, images, blurred, amplitudes, settings)
     is_both = settings.reference == "bidirectional" and len(clip.frames) > 2

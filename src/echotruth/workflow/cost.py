@@ -26,7 +26,7 @@ MEGABYTES = {
     **{"repository": 600, "report": 1200},
 }
 """Memory of a job of each rule for the default heart, MB."""
-MEGABYTES_OF_VOLUMES = MEGABYTES | {"rf": 800, "truth": 1100, "bmode": 1500, "tracking": 2000}
+MEGABYTES_OF_VOLUMES = MEGABYTES | {"rf": 800, "truth": 1100, "bmode": 1500, "tracking": 1300}
 """Likewise in volumes."""
 FRAMES, PIXELS, CELLS, VOXELS = 40, 512**2, 4320, 144 * 128 * 96
 """Frames, pixels and tetrahedra of the default heart, and voxels of a volume."""
