@@ -66,12 +66,12 @@ def samples(row: Mapping[str, object]) -> list[Sample]:
                 true, sort = truth.displacement / clip.spacing, (str(row["species"]), view, clip.size)
                 ours = [each for each in config.tracking.trackers.values() if not isinstance(each, OUTSIDE)]
                 for settings in ours:
-                    for noisy, values in _told(clip, true, settings, CENTRE_DEG[config.views[view].plane]):
+                    for noisy, values in _samples_of(clip, true, settings, CENTRE_DEG[config.views[view].plane]):
                         found.append(Sample(quality.error_name(settings), (*sort, noisy), *values))
     return [one for one in found if len(one.near)]
 
 
-def _told(clip: Clip, true: np.ndarray, settings, centre_deg: float) -> Iterator[tuple[bool, tuple]]:
+def _samples_of(clip: Clip, true: np.ndarray, settings, centre_deg: float) -> Iterator[tuple[bool, tuple]]:
     """Terms of points, and whether they are near, of a clip as it is and with noise in a sector; truth is in px."""
     every = np.ones(true.shape[:2], bool)
     yield False, _values(clip, true, settings, every)
@@ -116,7 +116,7 @@ def likeliest(given: list[Sample], start: quality.ErrorModel, names: tuple[str, 
     begin, bounds = [np.log(getattr(start, name)) for name in names], [(np.log(LOWEST), np.log(HIGHEST))] * len(names)
     best = np.exp(minimize(loss, begin, method="L-BFGS-B", bounds=bounds).x)
     idle = () if terms.disagreement.any() else ("disagreement", "wall")
-    idle += () if terms.told.any() else ("told",)
+    idle += () if terms.stated.any() else ("stated",)
     kept = {name: value * (value > NEGLIGIBLE and name not in idle) for name, value in zip(names, best, strict=True)}
     return replace(start, **{name: float(f"{value:.3g}") for name, value in kept.items()})
 

@@ -94,7 +94,7 @@ def test_point_that_is_not_seen_is_as_sure_as_its_displacement_is_small():
 
 
 def test_deviation_that_a_tracker_tells_adds_to_its_other_terms():
-    model, silent = replace(MODEL, told=0.5), path(0.1, 0.1)
+    model, silent = replace(MODEL, stated=0.5), path(0.1, 0.1)
     telling = replace(silent, deviation=np.array([[0.0], [0.7]]))
     expected = MODEL.probability(silent, SPECKLE, (128, 128))[1, 0]
     spread = [-1 / (2 * np.log1p(-each)) for each in (expected, model.probability(telling, SPECKLE, (128, 128))[1, 0])]

@@ -16,8 +16,8 @@ Reference = Annotated[
     Field(
         description="Frame with which each frame is compared: `ED`; the `previous` one, with the steps added along "
         "the path of the tissue; or `bidirectional`, likewise both forwards and backwards around the cycle, averaged "
-        "with weights from the correlation of the frames. Warns if the cycle is open, and then tracks forwards only, "
-        "unless the last frame is like the first."
+        "with weights from the correlation of the frames. A clip whose last frame is unlike the first is tracked "
+        "forwards only, with a warning."
     ),
 ]
 
@@ -107,8 +107,8 @@ class BsplineDic(Section):
         Literal["previous", "bidirectional"],
         Field(
             description="Forwards from ED only (`previous`), or `bidirectional`: forwards and backwards around the "
-            "cycle, averaged with weights from their variances. Warns if the cycle is open, and then tracks forwards "
-            "only, unless the last frame is like the first."
+            "cycle, averaged with weights from their variances. A clip whose last frame is unlike the first is "
+            "tracked forwards only, with a warning."
         ),
     ] = "bidirectional"
 

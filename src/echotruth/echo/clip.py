@@ -79,7 +79,7 @@ def read_clip(
     """
     is_path = isinstance(source, str | PathLike)
     name = str(source) if is_path else "array"
-    with np.errstate(all="ignore"):  # whatever is not finite is told below
+    with np.errstate(all="ignore"):  # whatever is not finite is reported below
         recording = files.read(Path(source)) if is_path else files.of_array(source)  # type: ignore[arg-type]
         _check_said(recording, spacing_mm, frame_time_ms, name)
         time = _time(recording, frame_time_ms, name)

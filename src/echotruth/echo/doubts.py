@@ -59,7 +59,7 @@ def doubts(strain: xr.Dataset, thickness: float) -> list[str]:
         A plain sentence each, without a full stop.
     """
     moved, time = strain["displacement"].values, strain["time"].values
-    told = (
+    found = (
         _size(thickness, time),
         _beats(moved, time),
         _rate(moved, thickness),
@@ -70,7 +70,7 @@ def doubts(strain: xr.Dataset, thickness: float) -> list[str]:
         _folds(strain),
         _segments(strain),
     )
-    return [text for text in told if text]
+    return [text for text in found if text]
 
 
 def _size(thickness: float, time: Floats) -> str:

@@ -99,8 +99,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
     points = _points(mask, spacing, scale)
     settings = _settings(tracker, options, scale)
     displacement, quality = track(frames, points, mask, spacing, clip["time"].values, 0, settings)
-    told = plausibility.doubts(frames, mask, spacing, settings)
-    if plausibility.NOISE in told:
+    notes = plausibility.doubts(frames, mask, spacing, settings)
+    if plausibility.NOISE in notes:
         displacement[:], quality[:] = np.nan, np.nan
     position, moved = points * spacing, displacement * spacing
     depth, normal = wall.depth(points)
@@ -122,8 +122,8 @@ def speckle_tracking(clip: xr.Dataset, wall: Wall, tracker: Tracker = "bspline_d
         source=clip.attrs.get("source", ""),
         spacing=spacing,
     )
-    told += doubts(data, wall.thickness() * spacing)
-    return data.assign_attrs(notes="\n".join(told))
+    notes += doubts(data, wall.thickness() * spacing)
+    return data.assign_attrs(notes="\n".join(notes))
 
 
 def _frames(clip: xr.Dataset) -> tuple[NDArray[np.uint8], float]:

@@ -93,7 +93,7 @@ class VolumeClip:
         return self.frames, points, self.mask, self.spacing, time, tracker_seed(self.case, self.view)
 
     def suited(self, settings: Section) -> Section:
-        """Settings of a tracker; those of ours are told that a cycle is open, which they do not look for in volumes."""
+        """Settings of a tracker; that a cycle is open `bspline_dic` does not see in volumes: it goes forwards only."""
         if isinstance(settings, BsplineDic) and not self.case.config.views[self.view].motion.is_closed:
             return settings.model_copy(update={"reference": "previous"})
         return settings

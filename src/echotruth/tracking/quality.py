@@ -26,16 +26,18 @@ class ErrorModel:
     (:mod:`echotruth.tracking.speckle`), the variance V of :class:`echotruth.tracking.accumulation.Path`, the tracked
     displacement u and the disagreement d, which is u at most, is
 
-        s^2 = N prior^2 / (N + prior^2) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2 + (told S)^2,
+        s^2 = N prior^2 / (N + prior^2) + (disagreement d)^2 + (wall D)^2 + (motion u)^2 + (unseen q u)^2
+              + (stated S)^2,
 
     where N = (speckle l)^2 V, D is the RMS of d over the points in the frame, q (0 to 1) how far the point is hidden,
     and S the deviation that a tracker gives, if it does. V l^2 is the variance of the places of speckle. It counts in
-    full where images are alike; elsewhere the tracker relies on its prior, a smooth motion. Forward and backward errors
-    often agree, so the frame's RMS D adds to d. Ways that are farther apart than the point has moved add no more.
+    full where images are alike; elsewhere the tracker relies on its prior, a smooth motion. At a point the
+    ways forwards and backwards may agree and both be wrong, so that D, their disagreement over the whole frame, counts
+    beside d. Where they are farther apart than the point has moved, d is that motion.
 
     Attributes
     ----------
-    speckle, prior, disagreement, wall, motion, unseen, told : float
+    speckle, prior, disagreement, wall, motion, unseen, stated : float
         See above.
     """
 
@@ -45,7 +47,7 @@ class ErrorModel:
     wall: float
     motion: float
     unseen: float = 0.0
-    told: float = 0.0
+    stated: float = 0.0
 
     def probability(self, path: Path, speckle: float, shape: tuple[float, ...]) -> np.ndarray:
         """Probability that points are within 1/256 of the side of the image of their true places.
@@ -73,7 +75,7 @@ class ErrorModel:
         prior = self.prior**2
         expected = prior * (1 - prior / (self.speckle**2 * terms.speckle * terms.variance + prior))
         expected += self.disagreement**2 * terms.disagreement + self.wall**2 * terms.wall
-        expected += self.told**2 * terms.told
+        expected += self.stated**2 * terms.stated
         return expected + (self.motion**2 + self.unseen**2 * terms.unseen) * terms.motion
 
 
@@ -91,7 +93,7 @@ class Squares:
         d^2, 0 where there is one way only, D^2, which is the same for all points of a frame, and u^2.
     unseen : ndarray of shape (frame, n)
         q^2, a number.
-    told : ndarray of shape (frame, n)
+    stated : ndarray of shape (frame, n)
         S^2, 0 if the tracker gives none.
     """
 
@@ -101,7 +103,7 @@ class Squares:
     wall: np.ndarray
     motion: np.ndarray
     unseen: np.ndarray
-    told: np.ndarray
+    stated: np.ndarray
 
 
 def squares(path: Path, speckle: float, shape: tuple[float, ...]) -> Squares:
@@ -111,8 +113,8 @@ def squares(path: Path, speckle: float, shape: tuple[float, ...]) -> Squares:
     apart = np.minimum(side * np.nan_to_num(path.disagreement, nan=0.0), np.nan_to_num(moved)) ** 2
     known = np.isfinite(moved).sum(1, keepdims=True)
     wall = np.broadcast_to(apart.sum(1, keepdims=True) / np.maximum(known, 1), apart.shape)
-    unseen, told = (np.zeros_like(moved) if each is None else each for each in (path.unseen, path.deviation))
-    return Squares(path.variance, (speckle * side) ** 2, apart, wall, moved**2, unseen**2, (side * told) ** 2)
+    unseen, stated = (np.zeros_like(moved) if each is None else each for each in (path.unseen, path.deviation))
+    return Squares(path.variance, (speckle * side) ** 2, apart, wall, moved**2, unseen**2, (side * stated) ** 2)
 
 
 ERRORS = {

@@ -31,8 +31,8 @@ def track(
     Parameters
     ----------
     frames : ndarray of shape (frame, axial, lateral)
-        B-mode clip, any real type; frame 0 is end-diastole. Warns if the cycle is open, which is then tracked
-        forwards only unless its last frame is like the first. Or volumes, (frame, depth, elevation, lateral), of a
+        B-mode clip, any real type; frame 0 is end-diastole. One whose last frame is unlike the first is tracked
+        forwards only, with a warning. Or volumes, (frame, depth, elevation, lateral), of a
         cycle that is taken to be closed; all vectors then have three components: lateral, elevation, depth.
     points : ndarray of shape (n, 2)
         Positions at end-diastole: lateral, axial, px (0 is the centre of the first pixel).

@@ -50,10 +50,10 @@ def execute(command: list[str], folder: Path, progress: Progress) -> int:
     log = folder / "logs/snakemake.log"
     log.parent.mkdir(parents=True, exist_ok=True)
     line = ProgressLine(folder.name, sys.stderr)
-    with log.open("a") as output, log.open("a+", errors="replace") as told:
-        lock.claim(told, folder)
-        told.truncate(0)
-        told.seek(0)
+    with log.open("a") as output, log.open("a+", errors="replace") as reader:
+        lock.claim(reader, folder)
+        reader.truncate(0)
+        reader.seek(0)
         process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT)
         # What is ignored, as by nohup, stays so.
         signals = [one for one in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(one) != signal.SIG_IGN]
@@ -62,7 +62,7 @@ def execute(command: list[str], folder: Path, progress: Progress) -> int:
             incomplete = ""
             while True:
                 is_over = process.poll() is not None
-                *complete, incomplete = (incomplete + told.read()).split("\n")
+                *complete, incomplete = (incomplete + reader.read()).split("\n")
                 for text in complete:
                     progress.read_line(text)
                 if is_over:

@@ -32,9 +32,9 @@ MAX_SLOPE = 1.0
 SLOPES_PER_BEAMWIDTH = 24
 """Slopes tabulated per wavelength over height."""
 MAX_SECOND_ORDER = 0.063
-"""Largest squared phase error (rad^2) of the common lens kernel: of the echo from the edge of an element relative to
-the mean of all elements, without the path to their centres, weighted by E over its value in the plane. The kernel is of
-first order in E; below this, echoes of a heart err by less than 1 % (L2, measured)."""
+"""All elements share the lens kernel of their mean where it errs by less than this: the square of the phase (rad^2) by
+which the echo from the edge of an element differs from that of the mean, the path to its centre apart, weighted by the
+echo over its value in the plane. Echoes of a heart then err by less than 1 % (L2, measured)."""
 
 
 class Lens:

@@ -47,8 +47,8 @@ def read_grids(sources: Sequence[str]) -> list[Any]:
 
 
 def _reason(target: str, otherwise: str) -> str:
-    told = Path(f"{target}.txt")
-    return told.read_text(encoding="utf-8") if told.is_file() else otherwise
+    reason = Path(f"{target}.txt")
+    return reason.read_text(encoding="utf-8") if reason.is_file() else otherwise
 
 
 def bad_cell(connectivity: Any, offsets: Any, types: Any, n_points: int) -> str:

@@ -77,12 +77,12 @@ class Model:
         by_name = {node.name: node for node in sorted(self.session.get_inputs(), key=lambda node: -len(node.shape))}
         names, known = self.signature.inputs or list(by_name), [node.name for node in self.session.get_outputs()]
         if sorted(names) != sorted(by_name) or len(names) != 2:
-            told = f"takes {' and '.join(by_name)}: it must take frames and points, named in this order"
-            raise TrackerFailed(f"{self.beside}: inputs = {names}: {self.path} {told}")
+            fault = f"takes {' and '.join(by_name)}: it must take frames and points, named in this order"
+            raise TrackerFailed(f"{self.beside}: inputs = {names}: {self.path} {fault}")
         self.outputs = self.signature.outputs or known[:1]
         if not {*self.outputs} <= {*known}:
-            told = f"{self.path} gives {' and '.join(known)}: use these names"
-            raise TrackerFailed(f"{self.beside}: outputs = {self.outputs}: {told}")
+            fault = f"{self.path} gives {' and '.join(known)}: use these names"
+            raise TrackerFailed(f"{self.beside}: outputs = {self.outputs}: {fault}")
         self.inputs = {key: by_name[name] for key, name in zip(("frames", "points"), names, strict=True)}
         self.layouts = {key: self._layout(key, node.name, node.shape, {}) for key, node in self.inputs.items()}
         shapes = [*self.inputs["frames"].shape, *self.inputs["points"].shape]
@@ -91,8 +91,8 @@ class Model:
         for axis, key in SIZES.items():
             given = getattr(self.signature, key)
             if given is not None and self.sizes.setdefault(axis, given) != given:
-                told = f"{self.path} takes {self.sizes[axis]}: leave it out"
-                raise TrackerFailed(f"{self.beside}: {key} = {given}: {told}")
+                fault = f"{self.path} takes {self.sizes[axis]}: leave it out"
+                raise TrackerFailed(f"{self.beside}: {key} = {given}: {fault}")
         if self.sizes.get("T", 2) < 2:
             raise TrackerFailed(f"{self.path}: takes one frame: export it with two or more, or with any number")
         self.sizes = {"H": SIDE, "W": SIDE} | self.sizes
@@ -116,9 +116,9 @@ class Model:
             raise TrackerFailed(f"{self.path}: {self.outputs[0]} begins {start:.0f} px from the points: {remedy}")
         visible = found[1] if found[1:] else np.full(shape[:-1], np.nan)
         if visible.shape not in (shape[:-1], (*shape[:-1], 1)) or (np.abs(visible - 0.5) > 0.5).any():
-            told = f"has the shape {visible.shape}, and is {visible.min():.3g} to {visible.max():.3g}"
+            fault = f"has the shape {visible.shape}, and is {visible.min():.3g} to {visible.max():.3g}"
             remedy = f"a visibility has the shape {shape[:-1]}, and is 0 to 1"
-            raise TrackerFailed(f"{self.path}: {self.outputs[1]} {told}: {remedy}")
+            raise TrackerFailed(f"{self.path}: {self.outputs[1]} {fault}: {remedy}")
         return tracks, visible.reshape(shape[-3:-1]).transpose(axes)
 
     def _run(self, video: Floats, places: Floats) -> list[np.ndarray]:
@@ -149,9 +149,9 @@ class Model:
             if len(layout) == len(shape) and all(fits):
                 return str(layout)
         given = f"{key} = {declared}" if declared else f"{key} is missing"
-        told = f"{name} of {self.path} has the shape ({', '.join(map(str, shape))})"
+        fault = f"{name} of {self.path} has the shape ({', '.join(map(str, shape))})"
         call = f", in a call with T = {sizes['T']} and N = {sizes['N']}" if sizes else ""
-        raise TrackerFailed(f"{self.beside}: {given}: {told}{call}: give the one of {', '.join(usual)} that fits")
+        raise TrackerFailed(f"{self.beside}: {given}: {fault}{call}: give the one of {', '.join(usual)} that fits")
 
 
 def _session(path: Path) -> tuple[Any, Any]:
@@ -165,7 +165,7 @@ def _session(path: Path) -> tuple[Any, Any]:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
-    options.log_severity_level = 4  # errors are raised, and told once
+    options.log_severity_level = 4  # errors are raised, and reported once
     try:
         session = onnxruntime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
     except Exception as error:  # ONNX Runtime raises many kinds
