@@ -35,7 +35,8 @@ static:
 
 # Modules with tests that need more than .venv; tests/docs/test_site.py builds the site.
 INTEGRATION := tests/cluster tests/test_torch.py tests/learning/test_baselines.py tests/sharing tests/repository/test_remote.py \
-	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/tracking/test_onnx.py tests/docs/test_site.py
+	tests/repository/test_export.py tests/repository/test_tensorstore.py tests/imaging/test_peers.py tests/imaging/test_row_column.py \
+	tests/tracking/test_onnx.py tests/docs/test_site.py
 
 test-integration: .venv-integration/ready
 	.venv-integration/bin/python -m pytest -n 2 --dist loadscope --no-loadscope-reorder $(INTEGRATION)

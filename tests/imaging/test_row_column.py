@@ -70,27 +70,46 @@ def test_echoes_with_attenuation_are_those_of_the_exact_sum():
     assert error(array(position, amplitude)[BINS], exact(array, probe, position, amplitude)) < 1e-3
 
 
+ALONG = np.arange(-PROBE.elements * PROBE.pitch_um / 2, PROBE.elements * PROBE.pitch_um / 2, SPEED / 25 / 8) * 1e-6
+"""Points an eighth of a wavelength apart along a strip, m."""
+
+
+def spherical_waves(array, centres, position, across, frequency):
+    """Waves of strips side by side along one axis at scatterers (strips, scatterers): the sum over `ALONG`."""
+    offset = position[:, across] - centres[:, None]
+    square = (offset**2 + position[:, 1] ** 2)[..., None]
+    distance = np.sqrt(square + (position[:, 2 - across, None] - ALONG) ** 2)
+    # Directivity of the width, and of the soft baffle.
+    sine, cosine = offset[..., None] / distance, position[:, 1, None] / distance
+    wave = np.sinc(WIDTH * frequency / SPEED * sine) * cosine * np.exp(-2j * np.pi * frequency / SPEED * distance)
+    return (wave / distance) @ array.sensitivity(ALONG) * (ALONG[1] - ALONG[0])
+
+
 def test_strips_are_those_of_finite_height_with_tapered_ends_by_quadrature(array):
-    """Spherical waves, summed over points an eighth of a wavelength apart along every strip."""
     position, amplitude = scatterers(8, half=(2.2e-3, 2.2e-3))
-    length = PROBE.elements * PROBE.pitch_um * 1e-6
-    along = np.arange(-length / 2, length / 2, SPEED / 25e6 / 8)
-    weight = array.sensitivity(along) * (along[1] - along[0])
     spectra = []
     for frequency in array.frequency[BINS]:
-        ways = []
-        for across, other in ((0, 2), (2, 0)):
-            offset = position[:, across] - array.centres[:, None]
-            square = (offset**2 + position[:, 1] ** 2)[..., None]
-            distance = np.sqrt(square + (position[:, other, None] - along) ** 2)
-            # Directivity of the width, and of the soft baffle.
-            sine, cosine = offset[..., None] / distance, position[:, 1, None] / distance
-            wave = (
-                np.sinc(WIDTH * frequency / SPEED * sine) * cosine * np.exp(-2j * np.pi * frequency / SPEED * distance)
-            )
-            ways.append((wave / distance) @ weight)
+        ways = [spherical_waves(array, array.centres, position, across, frequency) for across in (0, 2)]
         spectra.append(pulse_spectrum(PROBE, frequency) * (ways[0] * amplitude) @ ways[1].T)
     assert error(array(position, amplitude)[BINS], np.array(spectra)) < 0.01
+
+
+def test_waves_along_a_strip_are_those_of_pymust(array):
+    """Its elements are the points of the quadrature, and its pulse is one factor of each frequency."""
+    pymust, (position, _) = pytest.importorskip("pymust"), scatterers(40)
+    param, options = pymust.utils.Param(), pymust.utils.Options()
+    param.fc, param.bandwidth, param.c, param.baffle = 15.6e6, 70, SPEED, "soft"
+    param.elements, param.width = np.stack([np.full(len(ALONG), array.centres[20]), ALONG]), WIDTH
+    param.height, param.TXapodization = ALONG[1] - ALONG[0], array.sensitivity(ALONG)
+    options.FullFrequencyDirectivity, options.dBThresh, options.FrequencyStep = True, -20, 4.0
+    options.ElementSplitting = [1, 1]
+    lateral, axial, elevation = position.T[..., None, None]
+    _, theirs, used = pymust.pfield3(lateral, elevation, axial, np.zeros((1, len(ALONG))), param, False, options)
+    frequencies = np.linspace(0, 2 * param.fc, len(used))[used]
+    assert len(frequencies) > 5
+    for frequency, found in zip(frequencies, theirs.reshape(len(position), -1).T.conj(), strict=True):
+        (ours,) = spherical_waves(array, array.centres[20:21], position, 0, frequency)
+        assert error(np.vdot(found, ours) / np.vdot(found, found) * found, ours) < 1e-4
 
 
 def test_echoes_of_some_pass_a_filter_and_those_beside_the_array_are_left_out(array):
