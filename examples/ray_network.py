@@ -6,9 +6,10 @@
     echotruth run config/learning_ideal.yaml
     python examples/ray_network.py out/learning out/learning_human out/learning_ideal -o ray_network.npz
 
-Every clip of every size is tracked, one in four at half its frame rate and one in eight forwards only, and the network
-learns what is missing to the true motion and how far it is still off. Hearts that are held out tell how much better it
-is and how sure it may be; the weights are of the last step. A configuration takes them by `weights: ray_network.npz`.
+Every clip of every size is tracked, every other one also at half its frame rate and one in eight forwards only, and the
+network learns what is missing to the true motion and how far it is still off. Hearts that are held out tell how much
+better it is and how sure it may be; the weights are of the last step. A configuration takes them by `weights:
+ray_network.npz`.
 """
 
 import argparse
@@ -33,16 +34,23 @@ from echotruth.tracking.trackers.bspline_cnn import CHANNELS, MIRRORED, ODD, on_
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
 from echotruth.units import mm
 
-WIDTH, BATCH, EPOCHS, DROPOUT = 64, 8, 60, 0.15
+WIDTH, BATCH, DROPOUT = 64, 8, 0.15
+FROM_SCRATCH, GOING_ON = (60, 1e-3), (40, 5e-4)
+"""Epochs and largest learning rate of a new network, and of one that goes on from weights."""
 FRACTIONS = {"train": 0.85, "test": 0.15}
 STRAIN_RAYS, STRAIN_WEIGHT, DEVIATION_WEIGHT = 4, 0.3, 0.1
 """Rays between the ends of the lines whose strain counts, and weights of terms of the loss."""
-SHAKE = 0.2
-"""Standard deviation of the motion as a whole that is added, over the scale of the motion."""
+SHAKE, FIELD, WEAKEST, CLOCK = 0.2, 0.15, 0.6, 0.1
+"""Standard deviation of the motion as a whole that is added, and largest RMS of smooth fields, over the scale of the
+motion; largest loss of the motion of a sector; standard deviation of the clock of the beat, rad."""
+PHASE, RAY = (2 * np.pi * torch.arange(number) / number for number in (PHASES, RAYS))
+COURSES = torch.stack([PHASE / (2 * np.pi), (1 - torch.cos(PHASE)) / 2, torch.sin(PHASE)])
+"""Over the cycle: a drift, there and back, and to either side."""
+CLOCK_HANDS = [CHANNELS.index(name) for name in ("phase_cosine", "phase_sine")]
 DIRECTION = [CHANNELS.index(name) for name in ("ray_lateral", "ray_axial")]
 """Channels that are not both 0 on a ray that crosses the wall."""
 SCALE = CHANNELS.index("scale")
-LEARNING_RATE, WEIGHT_DECAY = 1e-3, 0.1
+WEIGHT_DECAY = 0.1
 
 
 @dataclass(frozen=True)
@@ -80,8 +88,10 @@ def samples(folder: str, case: str) -> list[Sample]:
     for view in config.views:
         for size in config.bmode.sizes:
             name, lot = f"{Path(folder).name}, {view}, {size} px", crc32(f"{case} {view} {size}".encode()) % 8
-            reference = "previous" if lot == 1 else "bidirectional"
-            found.append(sample(name, heart, repository.clip(case, view, size), 2 if lot in (0, 4) else 1, reference))
+            clip, reference = repository.clip(case, view, size), "previous" if lot == 4 else "bidirectional"
+            found.append(sample(name, heart, clip, 1, reference))
+            if lot < 4:
+                found.append(sample(name, heart, clip, 2, reference))
     return [one for one in found if one.known.any()]
 
 
@@ -124,6 +134,25 @@ class RayNetwork(nn.Module):
         correction = output[:, : 2 * DEPTHS].reshape(-1, DEPTHS, 2, PHASES, RAYS).transpose(1, 2)
         return correction - correction[..., :1, :], output[:, 2 * DEPTHS :]
 
+    def by_name(self):
+        """Weights by their names in a file, one or a list of those of all layers."""
+        return {
+            "first": self.first.weight,
+            "first_bias": self.first.bias,
+            "layers": [layer.weight for layer in self.layers],
+            "biases": [layer.bias for layer in self.layers],
+            "last": self.last.weight,
+            "last_bias": self.last.bias,
+        }
+
+    def read(self, path):
+        """Take the weights of a file of :func:`write`."""
+        with np.load(path) as arrays, torch.no_grad():
+            for name, own in self.by_name().items():
+                several, values = isinstance(own, list), torch.from_numpy(arrays[name].astype(np.float32))
+                for each, value in zip(own, values, strict=True) if several else [(own, values)]:
+                    each[:] = value.reshape(each.shape)
+
 
 def batch(chosen):
     """Arrays of some samples as tensors, by name."""
@@ -140,27 +169,55 @@ def mirrored(given):
     return found
 
 
-def shaken(given):
-    """A batch of hearts that also move as a whole, at random; images follow, so that errors stay as they are.
+def varied(given):
+    """A batch of hearts that move otherwise, at random; images follow.
 
-    They drift, and go and come back, along both axes, and they turn about the middle of the cavity.
+    A sector of the wall moves less, or the other way, and errors there are less as well. Smooth fields and motions of
+    the heart as a whole are added, and errors stay as they are. The clock of the beat runs ahead or behind.
     """
-    phase, ray = 2 * np.pi * torch.arange(PHASES) / PHASES, 2 * np.pi * torch.arange(RAYS) / RAYS
-    courses = torch.stack([phase / (2 * np.pi), (1 - torch.cos(phase)) / 2, torch.sin(phase)])
-    size = SHAKE * torch.randn(len(given["channels"]), 3, len(courses))
-    lateral, axial, turn = (size @ courses)[:, :, None, :, None].unbind(1)  # (batch, 1, PHASES, 1)
-    distance = given["start"][:, 0] / given["start"][:, 0].mean((1, 2), keepdim=True)
-    along = lateral * torch.cos(ray) + axial * torch.sin(ray)
-    across = axial * torch.cos(ray) - lateral * torch.sin(ray) + turn / 2 * distance[:, :, None]
-    more = torch.stack([along.expand_as(across), across], 1)
+    weaker, more = sector(len(given["channels"])), smooth_fields(len(given["channels"])) + whole_motion(given)
     crossed = given["channels"][:, DIRECTION].abs().sum(1, keepdim=True) > 0
-    found = given | {name: given[name] + more for name in ("tracked", "true")} | {"channels": given["channels"].clone()}
-    found["channels"][:, : 2 * DEPTHS] += more.flatten(1, 2) * crossed
+    found = given | {name: weaker * given[name] + more for name in ("tracked", "true")}
+    found["channels"] = channels = given["channels"].clone()
+    channels[:, : 2 * DEPTHS] += (found["tracked"] - given["tracked"]).flatten(1, 2) * crossed
+    late = CLOCK * torch.randn(len(channels), 1, 1)
+    (cosine, sine), turned = given["channels"][:, CLOCK_HANDS].unbind(1), (torch.cos(late), torch.sin(late))
+    channels[:, CLOCK_HANDS[0]] = cosine * turned[0] - sine * turned[1]
+    channels[:, CLOCK_HANDS[1]] = sine * turned[0] + cosine * turned[1]
     larger = largest(found["tracked"], given) / largest(given["tracked"], given)
-    found["channels"][:, SCALE] += torch.log(larger)[:, None, None] * crossed[:, 0]
-    found["channels"][:, : 4 * DEPTHS] /= larger[:, None, None, None]
+    channels[:, SCALE] += torch.log(larger)[:, None, None] * crossed[:, 0]
+    channels[:, : 4 * DEPTHS] /= larger[:, None, None, None]
     lengths = ("tracked", "true", "start")
     return found | {name: (found[name].movedim(0, -1) / larger).movedim(-1, 0) for name in lengths}
+
+
+def sector(number):
+    """Share of its motion that the wall of each clip keeps, (clip, 1, 1, 1, RAYS): in half of them less in a sector."""
+    middle, width = 2 * np.pi * torch.rand(number, 1), np.pi * (1 + 2 * torch.rand(number, 1)) / 6
+    apart = ((RAY - middle + np.pi) % (2 * np.pi) - np.pi).abs() / width
+    lost = WEAKEST * torch.rand(number, 1) * (torch.rand(number, 1) < 0.5)
+    return (1 - lost * torch.cos(np.pi / 2 * apart.clamp(max=1)) ** 2)[:, None, None, None]
+
+
+def smooth_fields(number):
+    """Motion (clip, 2, DEPTHS, PHASES, RAYS) of harmonics 0 to 4 around the wall and polynomials to the second degree
+    through it, in half of the clips."""
+    harmonic, depth = torch.arange(5), torch.linspace(-1, 1, DEPTHS)[:, None] ** torch.arange(3)
+    size = torch.randn(number, 2, 2, 3, 5, 1) / (1 + harmonic[:, None])
+    around = (size * torch.cos(harmonic[:, None] * RAY + 2 * np.pi * torch.rand(size.shape))).sum(-2)
+    amount = FIELD * torch.rand(number, 1, 1, 1, 1) * (torch.rand(number, 1, 1, 1, 1) < 0.5)
+    return amount * torch.einsum("nkcpr,dp,kt->ncdtr", around, depth, COURSES[1:])
+
+
+def whole_motion(given):
+    """Motion (clip, 2, DEPTHS, PHASES, RAYS) of the heart as a whole: it drifts, and goes and comes back, along both
+    axes, and it turns about the middle of the cavity."""
+    size = SHAKE * torch.randn(len(given["channels"]), 3, len(COURSES))
+    lateral, axial, turn = (size @ COURSES)[:, :, None, :, None].unbind(1)  # (batch, 1, PHASES, 1)
+    distance = given["start"][:, 0] / given["start"][:, 0].mean((1, 2), keepdim=True)
+    along = lateral * torch.cos(RAY) + axial * torch.sin(RAY)
+    across = axial * torch.cos(RAY) - lateral * torch.sin(RAY) + turn / 2 * distance[:, :, None]
+    return torch.stack([along.expand_as(across), across], 1)
 
 
 def largest(moved, given):
@@ -178,8 +235,7 @@ def relative_error(moved, given):
 
 def strain(moved, given):
     """Strain (batch, DEPTHS, PHASES, RAYS) of lines from each ray to one beside it."""
-    angle = 2 * np.pi * torch.arange(RAYS) / RAYS
-    cosine, sine = torch.cos(angle), torch.sin(angle)
+    cosine, sine = torch.cos(RAY), torch.sin(RAY)
 
     def length(local):
         along, across = local[:, 0], local[:, 1]
@@ -218,18 +274,22 @@ def bounded(log_deviation):
     return log_deviation.clamp(np.log(LEAST_DEVIATION), np.log(LARGEST_DEVIATION))
 
 
-def train(chosen, epochs=EPOCHS, seed=0):
-    """A network trained on samples."""
+def train(chosen, epochs=None, seed=0, start=None):
+    """A network trained on samples, from the weights of a file if one is given."""
     torch.manual_seed(seed)
     random, network = np.random.default_rng(seed), RayNetwork(len(CHANNELS))
+    usual, rate = GOING_ON if start else FROM_SCRATCH
+    epochs = epochs or usual
+    if start:
+        network.read(start)
     steps = torch.optim.AdamW(network.parameters(), weight_decay=WEIGHT_DECAY)
     per_epoch = max(1, len(chosen) // BATCH)
-    pace = torch.optim.lr_scheduler.OneCycleLR(steps, LEARNING_RATE, total_steps=epochs * per_epoch)
+    pace = torch.optim.lr_scheduler.OneCycleLR(steps, rate, total_steps=epochs * per_epoch)
     for epoch in range(epochs):
         order, losses = random.permutation(len(chosen)), []
         for number in range(per_epoch):
             given = batch([chosen[index] for index in order[number * BATCH : (number + 1) * BATCH]])
-            given = shaken(mirrored(given) if random.random() < 0.5 else given)
+            given = varied(mirrored(given) if random.random() < 0.5 else given)
             correction, log_deviation = network(given["channels"])
             moved = given["tracked"] + correction
             loss = relative_error(moved, given) + STRAIN_WEIGHT * strain_error(moved, given)
@@ -253,17 +313,9 @@ def channel_range(chosen):
 
 def write(network, chosen, path):
     """Write the weights, and the range of what they learned from, in half precision, as `bspline_cnn` reads them."""
-    layers, (least, largest) = network.layers, channel_range(chosen)
-    arrays = {
-        "first": network.first.weight[:, :, 0, 0],
-        "first_bias": network.first.bias,
-        "layers": torch.stack([layer.weight for layer in layers]),
-        "biases": torch.stack([layer.bias for layer in layers]),
-        "last": network.last.weight[:, :, 0, 0],
-        "last_bias": network.last.bias,
-        "least": least,
-        "largest": largest,
-    }
+    own = network.by_name().items()
+    arrays = {name: torch.stack(one) if isinstance(one, list) else one.squeeze() for name, one in own}
+    arrays |= dict(zip(("least", "largest"), channel_range(chosen), strict=True))
     np.savez_compressed(path, **{name: values.detach().numpy().astype(np.float16) for name, values in arrays.items()})
 
 
@@ -327,16 +379,19 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("repository", nargs="+", help="folder of a repository")
     parser.add_argument("-o", "--output", type=Path, default=Path("ray_network.npz"), help="file of the weights")
+    parser.add_argument("--start", type=Path, help="weights from which training goes on")
     given = parser.parse_args()
     if not given.output.absolute().parent.is_dir() or given.output.suffix != ".npz":
         parser.error(f"{given.output}: give a file .npz in a folder that is there")
+    if given.start and not given.start.is_file():
+        parser.error(f"--start {given.start}: there is no such file")
     tables = {folder: learning.cases(folder, "status == 'complete'") for folder in given.repository}
     try:
         parts = learning.split(pd.concat(tables), FRACTIONS, seed=1)
     except ValueError as error:
         parser.error(str(error))
     chosen, held_out = (list(all_samples(part.index)) for part in parts.values())
-    network = train(chosen)
+    network = train(chosen, start=given.start)
     calibrate(network, held_out)
     write(network, chosen, given.output)
     clips = scores(network, held_out).groupby("name", sort=False)

@@ -250,7 +250,7 @@ def test_healthy_heart_keeps_the_correction():
         ([*range(BEAT)] * 2, "the motion comes again after 12 frames, and the clip has 24, which"),
         (
             [0, 0, 1, 0, 0, 0, 0],
-            "moves inwards by less than 10 % of its thickness, or thickens by less than 5 %, which",
+            "moves inwards by less than 10 % of its thickness, or thins by more than 3 %, which",
         ),
     ],
 )

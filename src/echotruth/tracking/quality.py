@@ -124,7 +124,7 @@ ERRORS = {
     "dis": ErrorModel(0.162, 1.72, 0.185, 0.333, 0.104, 0.0, 0.0),
     "dis_fine": ErrorModel(0.139, 1.94, 0.184, 0.336, 0.07, 0.0, 0.0),
     "bspline_dic": ErrorModel(0.153, 0.464, 0.205, 0.297, 0.0326, 0.203, 0.0),
-    "bspline_cnn": ErrorModel(0.12, 0.183, 0.13, 0.198, 0.0, 0.117, 0.84),
+    "bspline_cnn": ErrorModel(0.0899, 0.261, 0.116, 0.188, 0.0114, 0.117, 0.693),
 }
 """Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`.
 That of `bspline_dic` is not fitted on volumes, where it is used too."""

@@ -65,10 +65,11 @@ CORRECTION_WEIGHTS = (0.0, 0.25, 0.5, 0.75, 1.0)
 BONUS = 0.04
 """Largest loss of similarity at which the whole correction is still preferred to none; docs/tracking.md says on which
 clips it was chosen."""
-LEAST_CONTRACTION, LEAST_THICKENING = 0.1, 0.05
+LEAST_CONTRACTION, LEAST_THICKENING = 0.1, -0.03
 """Mean motion of the wall towards the cavity in the frame in which it is largest, over its thickness, and thickening of
 the wall then, below which the network is not used: it has learned from hearts that contract and thicken. Hearts have
-0.20 and 0.15 or more, walls that rest, turn, twist or dilate 0.03 or less (docs/tracking.md)."""
+0.19 and -0.01 or more, since coarse speckle hides the thickening of a long axis; walls that rest, turn, twist or dilate
+have 0.03 or less, and rings that shrink -0.05 or less (docs/tracking.md)."""
 LEAST_FRAMES = 6
 """Frames of a beat at least, of which 24 phases can be distinguished."""
 
@@ -134,12 +135,11 @@ def unknown_motion(clip: TrackerInput, features: RayFeatures) -> str:
     """Why a clip is none of those that the network knows, the beginning of a sentence; empty if it may be one."""
     if not clip.is_closed:
         return "the clip is no closed cycle"
-    inwards, thickening = contraction(features)
-    if inwards < LEAST_CONTRACTION or thickening < LEAST_THICKENING:
-        least = (
-            f"{100 * LEAST_CONTRACTION:.0f} % of its thickness, or thickens by less than {100 * LEAST_THICKENING:.0f} %"
-        )
-        return f"since the first frame the wall moves inwards by less than {least}"
+    moved, thicker = contraction(features)
+    if moved < LEAST_CONTRACTION or thicker < LEAST_THICKENING:
+        inwards, thins = (f"{100 * least:.0f} %" for least in (LEAST_CONTRACTION, -LEAST_THICKENING))
+        bounds = f"inwards by less than {inwards} of its thickness, or thins by more than {thins}"
+        return f"since the first frame the wall moves {bounds}"
     if period := repetition(features.places().reshape(len(clip.frames), -1, 2)):
         return f"the motion comes again after {period} frames, and the clip has {len(clip.frames)}"
     return ""
