@@ -28,6 +28,8 @@ from echotruth.inference.observation import ObservationError, heart_name, seen_o
 
 TRACKERS = ("dis", "bspline_dic", "bspline_cnn")
 """Of the suite, whose errors are kept."""
+SUITE = "suite/"
+"""Beginning of the names of its hearts."""
 
 Row = tuple[str, int, str, str, str, str, str, Floats, Floats]
 """As `tracker_errors.table_of` takes it."""
@@ -63,11 +65,11 @@ def errors_of_suite() -> Iterator[Row]:
     for (*clip, heart, case, view), rows in detection.shown(columns.segments(table)).groupby(of_clip):
         seen = rows[rows["aha"] < APEX_SEGMENT].dropna(subset=["true_es_percent", "tracked_es_percent"])
         if len(seen):
-            place = seen["component"].iloc[0], f"suite/{heart}", case, view
+            place = seen["component"].iloc[0], f"{SUITE}{heart}", case, view
             yield *clip, *place, *(seen[f"{what}_es_percent"].to_numpy() / 100 for what in ("tracked", "true"))
     turned = table[table["variation"] != "motion"].dropna(subset=list(columns.ROTATION))
     for row in turned.itertuples():
-        place = "rotation", f"suite/{row.heart}", row.case, row.view
+        place = "rotation", f"{SUITE}{row.heart}", row.case, row.view
         both = (np.radians([value]) for value in (row.tracked_rotation_es_deg, row.true_rotation_es_deg))
         yield row.tracker, row.size_px, row.acoustics, *place, *both
 
@@ -84,6 +86,8 @@ def main() -> None:
     table = tracker_errors.table_of(rows)
     if arguments.output.is_file():
         old, keys = tracker_errors.read(arguments.output), [*tracker_errors.KEYS, *tracker_errors.PLACE]
+        if not arguments.repositories:
+            old = old[~old["heart"].str.startswith(SUITE)]  # of an earlier one, too
         table = pd.concat([old, table]).drop_duplicates(keys, keep="last").sort_values(keys)
     table.to_csv(arguments.output, index=False, float_format="%.6f")
     print(f"{arguments.output}: {table['heart'].nunique()} hearts, {len(table)} rows")
