@@ -87,7 +87,7 @@ def main() -> None:
     if arguments.output.is_file():
         old, keys = tracker_errors.read(arguments.output), [*tracker_errors.KEYS, *tracker_errors.PLACE]
         if not arguments.repositories:
-            old = old[~old["heart"].str.startswith(SUITE)]  # of an earlier one, too
+            old = old[~old["heart"].str.startswith(SUITE)]  # hearts of an earlier suite have the same names
         table = pd.concat([old, table]).drop_duplicates(keys, keep="last").sort_values(keys)
     table.to_csv(arguments.output, index=False, float_format="%.6f")
     print(f"{arguments.output}: {table['heart'].nunique()} hearts, {len(table)} rows")

@@ -34,7 +34,7 @@ from echotruth.tracking.trackers.bspline_cnn import CHANNELS, MIRRORED, ODD, on_
 from echotruth.tracking.wall_rays import DEPTHS, RAYS
 from echotruth.units import mm
 
-WIDTH, BATCH, DROPOUT = 64, 8, 0.15
+WIDTH, BATCH, DROPOUT, WEIGHT_DECAY = 64, 8, 0.15, 0.1
 FROM_SCRATCH, GOING_ON = (60, 1e-3), (40, 5e-4)
 """Epochs and largest learning rate of a new network, and of one that goes on from weights."""
 FRACTIONS = {"train": 0.85, "test": 0.15}
@@ -50,7 +50,6 @@ CLOCK_HANDS = [CHANNELS.index(name) for name in ("phase_cosine", "phase_sine")]
 DIRECTION = [CHANNELS.index(name) for name in ("ray_lateral", "ray_axial")]
 """Channels that are not both 0 on a ray that crosses the wall."""
 SCALE = CHANNELS.index("scale")
-WEIGHT_DECAY = 0.1
 
 
 @dataclass(frozen=True)
@@ -135,23 +134,23 @@ class RayNetwork(nn.Module):
         return correction - correction[..., :1, :], output[:, 2 * DEPTHS :]
 
     def by_name(self):
-        """Weights by their names in a file, one or a list of those of all layers."""
+        """Weights by their names in a file, a list of those of one or of all layers."""
         return {
-            "first": self.first.weight,
-            "first_bias": self.first.bias,
+            "first": [self.first.weight],
+            "first_bias": [self.first.bias],
             "layers": [layer.weight for layer in self.layers],
             "biases": [layer.bias for layer in self.layers],
-            "last": self.last.weight,
-            "last_bias": self.last.bias,
+            "last": [self.last.weight],
+            "last_bias": [self.last.bias],
         }
 
     def read(self, path):
         """Take the weights of a file of :func:`write`."""
         with np.load(path) as arrays, torch.no_grad():
             for name, own in self.by_name().items():
-                several, values = isinstance(own, list), torch.from_numpy(arrays[name].astype(np.float32))
-                for each, value in zip(own, values, strict=True) if several else [(own, values)]:
-                    each[:] = value.reshape(each.shape)
+                values = torch.from_numpy(arrays[name].astype(np.float32))
+                for each, value in zip(own, values.reshape(len(own), *own[0].shape), strict=True):
+                    each.copy_(value)
 
 
 def batch(chosen):
@@ -313,8 +312,7 @@ def channel_range(chosen):
 
 def write(network, chosen, path):
     """Write the weights, and the range of what they learned from, in half precision, as `bspline_cnn` reads them."""
-    own = network.by_name().items()
-    arrays = {name: torch.stack(one) if isinstance(one, list) else one.squeeze() for name, one in own}
+    arrays = {name: torch.stack(own).squeeze() for name, own in network.by_name().items()}
     arrays |= dict(zip(("least", "largest"), channel_range(chosen), strict=True))
     np.savez_compressed(path, **{name: values.detach().numpy().astype(np.float16) for name, values in arrays.items()})
 

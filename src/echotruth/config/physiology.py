@@ -55,8 +55,7 @@ class Physiology(Section):
     with a diseased ventricle ("Evaluation of Pulmonary Arterial End-Diastolic Pressure", 50 people)."""
     edv_of_healthy_min: Positive | None = 0.95
     """Smallest end-diastolic volume over that of the loop, which is the healthy heart's: no disease here empties a
-    ventricle but loss of blood. It is checked where a volume loop is given and
-    the stiffness is not."""
+    ventricle but loss of blood. It is checked where a volume loop is given and the stiffness is not."""
     edv_per_mass_min_mL_per_g: Positive | None = 0.3
     """Smallest end-diastolic volume over the mass of the wall (density 1.05 g/mL): 59.9 +- 8.8 uL over 81.9 +-
     9.7 mg in mice (doi 10.1186/1476-7120-11-12); conductance finds 25 to 53 uL (Pacher 2008). `human` 0.9."""
