@@ -195,7 +195,7 @@ class Page:
     def qualities(self, species: str) -> str:
         """Stated and observed share of right points by acoustics, plane and image size, and the calibration error."""
         clips = self.of(species=species).sort_values("size_px", ascending=False, kind="stable")
-        steps = columns.reliability(clips).merge(clips[["case", "view", "plane"]].drop_duplicates())
+        steps = _stated(clips).merge(clips[["case", "view", "plane"]].drop_duplicates())
         keys = ["acoustics", "plane", "size_px"]
         found = {
             f"{acoustics}, {plane.replace('_', ' ')}, {size} px": {
@@ -241,8 +241,9 @@ class Page:
         charts.draw_ratios(folder / "ratios.png", self.boards)
         if self.power:
             charts.draw_power(folder / "power.png", self.power)
-        curves = quality.curve(columns.reliability(self.mice))
-        charts.draw_reliability(folder / "reliability.png", curves, self.order)
+        curves = quality.curve(_stated(self.mice))
+        known = [name for name in self.order if name in set(curves["tracker"])]
+        charts.draw_reliability(folder / "reliability.png", curves, known)
 
     @cached_property
     def _segments(self) -> dict[int, pd.DataFrame]:
@@ -296,6 +297,12 @@ def write(parts: pd.DataFrame, file: Path, split: str = "test") -> Path:
     text = template.render(page=page, folder=folder.name, reference=REFERENCE, ranked_by=RANKED_BY, least=LEAST_HEARTS)
     files.write(file, f"{text}\n".encode())
     return file
+
+
+def _stated(clips: pd.DataFrame) -> pd.DataFrame:
+    """Steps of quality that have points, as :func:`.columns.reliability` returns them."""
+    steps = columns.reliability(clips)
+    return steps[steps["count"] > 0]
 
 
 def markdown(headings: list[str], rows: list[list[str]]) -> str:
