@@ -183,12 +183,13 @@ def scores(
     found, true = (each * SIDE / side for each in displacement)
     apart = np.linalg.norm(np.nan_to_num(found) - true, axis=-1)
     right = np.isfinite(found).all(-1) & (apart < WITHIN)
+    is_stated = np.isfinite(quality).any()
     return {
         "error_px": np.sqrt(np.mean(apart[es] ** 2)),
         "motion_px": np.sqrt(np.mean((true[es] ** 2).sum(-1))),
         "radial_strain_percent": 100 * np.nanmean(radial[0]),
         "true_radial_strain_percent": 100 * np.nanmean(radial[1]),
-        "stated_percent": 100 * np.mean(np.nan_to_num(quality[1:])),
+        "stated_percent": 100 * np.mean(np.nan_to_num(quality[1:])) if is_stated else np.nan,
         "right_percent": 100 * np.mean(right[1:]),
     }
 

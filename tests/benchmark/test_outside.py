@@ -54,3 +54,4 @@ def test_scores_of_what_is_found_and_of_a_shift():
     shifted = outside.scores((true + [3 * unit, 4 * unit], true), quality, 2, 25e-3, radial)
     assert (shifted["error_px"], shifted["right_percent"]) == pytest.approx((5, 0))
     assert (same["radial_strain_percent"], same["true_radial_strain_percent"]) == pytest.approx((30, 10))
+    assert np.isnan(outside.scores((true, true), np.full_like(quality, np.nan), 2, 25e-3, radial)["stated_percent"])
