@@ -6,7 +6,6 @@ python benchmarks/volume_picture.py
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyvista
@@ -16,6 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from volumes import INFARCT, SETTINGS
 
 import echotruth as et
 from echotruth.evaluation.volume import COMPONENTS, VolumePoints, segment_strain, strain_radius
@@ -26,14 +26,7 @@ from echotruth.report.clip import webp
 from echotruth.repository.datasets import VOLUME, imaged_heart
 
 TARGET = Path(__file__).parents[1] / "docs/gallery/volume.webp"
-SETTINGS: dict[str, Any] = {
-    "seed": 22,
-    "geometry": {"circumferential_elements": 18, "longitudinal_elements": 9, "transmural_elements": 2},
-    "loop": {"kind": "circulation", "frames": 16},
-    "views": {"whole": {"plane": "volume"}},
-    "probe": {"preset": "mouse_row_column_15MHz"},
-    "pathology": {"infarct": {"segments": [11, 12, 16], "age": "fresh"}},
-}
+CONFIG = et.configure(et.configure(**SETTINGS), seed=22, **INFARCT | {"pathology.infarct.segments": [11, 12, 16]})
 STRAIN, LIMIT = "CC", 0.2
 """Component that is shown, and the end of its scale."""
 TITLES = "Echo, a quarter cut away", "True circumferential strain", "Tracked in the echo (%)", "True (%)"
@@ -76,7 +69,7 @@ def renderings(clip: xr.Dataset, heart: Heart, frame: int) -> list[NDArray[np.ui
 
 def pictures(clip: xr.Dataset, heart: Heart, tracked: xr.Dataset) -> NDArray[np.uint8]:
     """Frames (frame, row, column, 3)."""
-    radius = strain_radius(et.configure(**SETTINGS))
+    radius = strain_radius(CONFIG)
     points = VolumePoints(*imaged_heart(clip, heart), tracked_positions(tracked), radius)
     number, scale = COMPONENTS.index(STRAIN.lower()), TwoSlopeNorm(0, -100 * LIMIT, 100 * LIMIT)
     found = []
@@ -98,7 +91,7 @@ def pictures(clip: xr.Dataset, heart: Heart, tracked: xr.Dataset) -> NDArray[np.
 
 
 def main() -> None:
-    heart = et.beat(et.configure(**SETTINGS))
+    heart = et.beat(CONFIG)
     clip = et.image(heart, "whole")
     webp(TARGET, pictures(clip, heart, et.track(clip, "bspline_dic")))
 
