@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.echo.failure import FEWEST_FRAMES, EchoError, one_line, optional
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, optional, reading
 from echotruth.echo.recording import Recording, grey
 
 TWO_DIMENSIONAL, CENTIMETRES = 1, 3
@@ -36,21 +36,14 @@ def read(path: Path) -> Recording:
         If pydicom is not installed, or the file holds no clip that it can decode.
     """
     pydicom = optional("pydicom", path)
-    try:
+    with reading(path, "no DICOM clip that can be decoded"):
         image = pydicom.dcmread(path)
         pixels = np.asarray(image.pixel_array)
-    except Exception as error:  # pydicom has no common type for what is wrong with a file
-        raise EchoError(f"{path}: is no DICOM clip that can be decoded: {one_line(error)}") from None
     colours = int(getattr(image, "SamplesPerPixel", 1)) > 1
     if pixels.ndim != 3 + colours:
         raise EchoError(f"{path}: has 1 frame: a clip needs {FEWEST_FRAMES} or more")
-    try:
-        return _recording(image, pixels, path)
-    except EchoError:
-        raise
-    except Exception as error:  # values are decoded when they are asked for
-        what = f"its region, scale or times cannot be read: {one_line(error)}"
-        raise EchoError(f"{path}: is a damaged DICOM clip: {what}") from None
+    with reading(path, "a damaged DICOM clip: its region, scale or times cannot be read"):
+        return _recording(image, pixels, path)  # values are decoded when they are asked for
 
 
 def _recording(image: Any, pixels: NDArray[Any], path: Path) -> Recording:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from zarr.storage import ZipStore
 
 from echotruth.arrays import Floats
-from echotruth.echo.failure import EchoError, one_line
+from echotruth.echo.failure import EchoError, reading
 from echotruth.echo.recording import Recording, check_size
 
 BMODE, TIMES = "data/2d_brightness_mode", "timestamps/2d_brightness_mode"
@@ -41,17 +41,13 @@ def read(path: Path) -> Recording:
     EchoError
         If it is no such store, or has no B-mode, sector or matching times.
     """
-    try:
+    with reading(path, "no Zarr store of a recording that can be read"):
         group: Any = zarr.open_group(ZipStore(path, mode="r") if path.is_file() else path, mode="r")
         if BMODE not in group:
             raise EchoError(f"{path}: has no {BMODE}: give a recording of EchoXFlow with a B-mode in one plane")
         sector, lines = _sector(group.attrs), _checked(group[BMODE], path)[:]
         times = next((name for name in (_array(sector.get("timestamps")), TIMES) if name and name in group), None)
         time = _of_frames(group[times], len(lines), path) if times else np.empty(0)
-    except EchoError:
-        raise
-    except Exception as error:  # zarr has no common type for what is wrong with a store
-        raise EchoError(f"{path}: is no Zarr store of a recording that can be read: {one_line(error)}") from None
     frames, spacing = scan_convert(lines, *_limits(sector.get("geometry"), path))
     return Recording(frames, (spacing, spacing), time - time[:1])
 

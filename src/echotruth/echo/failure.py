@@ -1,5 +1,7 @@
 """What is said of a clip or a wall that cannot be used."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -26,9 +28,15 @@ def _listed(words: list[Any]) -> str:
     return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
-def one_line(error: Exception) -> str:
-    """What a library says of a file, on one line of 200 letters at most."""
-    return " ".join(str(error).split())[:200]
+@contextmanager
+def reading(path: Path, fault: str) -> Iterator[None]:
+    """Say what is wrong with a file, and what the library says of it, in place of whatever error that raises."""
+    try:
+        yield
+    except EchoError:
+        raise
+    except Exception as error:  # most libraries have no common type for what is wrong with a file
+        raise EchoError(f"{path}: is {fault}: {' '.join(str(error).split())[:200]}") from None
 
 
 def optional(package: str, path: Path) -> Any:

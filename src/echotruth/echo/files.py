@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from echotruth.echo import dicom, echoxflow
-from echotruth.echo.failure import FEWEST_FRAMES, EchoError, one_line, optional
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, optional, reading
 from echotruth.echo.recording import Recording, check_size, grey
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
@@ -95,14 +95,9 @@ def _pages(path: Path) -> list[NDArray[Any]]:
     """Images (axial, lateral) of a file: the frames of an animation, the pages of a TIFF, or one."""
     with warnings.catch_warnings():
         warnings.simplefilter("error", Image.DecompressionBombWarning)
-        try:
-            with Image.open(path) as image:
-                check_size(image.width * image.height * getattr(image, "n_frames", 1), str(path))
-                return [_levels(page, path) for page in ImageSequence.Iterator(image)]
-        except EchoError:
-            raise
-        except Exception as error:  # Pillow has no common type for what is wrong with a file
-            raise EchoError(f"{path}: is no image that can be read: {one_line(error)}") from None
+        with reading(path, "no image that can be read"), Image.open(path) as image:
+            check_size(image.width * image.height * getattr(image, "n_frames", 1), str(path))
+            return [_levels(page, path) for page in ImageSequence.Iterator(image)]
 
 
 def _levels(page: Image.Image, path: Path) -> NDArray[Any]:
@@ -134,12 +129,10 @@ def _video(path: Path) -> Recording:
 def _nifti(path: Path) -> Recording:
     """Frames of (lateral, axial, 1, frame) or (lateral, axial, frame), with their scale."""
     nibabel = optional("nibabel", path)
-    try:
+    with reading(path, "no NIfTI file that can be read"):
         image = nibabel.load(path)
         pixels = np.asarray(image.dataobj)
         sizes, units = [float(size) for size in image.header.get_zooms()], image.header.get_xyzt_units()
-    except Exception as error:  # nibabel has no common type for what is wrong with a file
-        raise EchoError(f"{path}: is no NIfTI file that can be read: {one_line(error)}") from None
     if pixels.ndim == 4 and pixels.shape[2] == 1:
         pixels, sizes = pixels[:, :, 0], [*sizes[:2], *sizes[3:]]
     if pixels.ndim != 3:
@@ -157,10 +150,8 @@ def _array(path: Path) -> Recording:
 
 def _loaded(path: Path) -> NDArray[Any]:
     """Array of a NumPy file, which is not read before its header is known to promise no more than the file holds."""
-    try:
-        return np.lib.format.open_memmap(path, mode="r")
-    except Exception as error:  # NumPy parses the header as Python, and raises whatever that does
-        raise EchoError(f"{path}: is no array that numpy.load reads: {one_line(error)}") from None
+    with reading(path, "no array that numpy.load reads"):
+        return np.lib.format.open_memmap(path, mode="r")  # parses the header as Python, and raises whatever that does
 
 
 def of_image(path: Path) -> NDArray[np.bool_]:

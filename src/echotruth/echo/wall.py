@@ -16,7 +16,7 @@ from skimage.measure import find_contours, label
 
 from echotruth import files
 from echotruth.arrays import Floats
-from echotruth.echo.failure import EchoError, one_line
+from echotruth.echo.failure import EchoError, reading
 from echotruth.echo.files import of_image
 from echotruth.echo.wall_file import part as part_of
 from echotruth.echo.wall_file import said
@@ -350,10 +350,8 @@ def _of_table(file: Path, view: str) -> Wall:
 
 def _table(file: Path) -> pd.DataFrame:
     """Rows of a .csv, of which each has a part and its place in numbers."""
-    try:
+    with reading(file, "no table that can be read"):
         table = pd.read_csv(file, comment="#", skipinitialspace=True)
-    except (ValueError, OSError) as error:
-        raise EchoError(f"{file}: is no table that can be read: {one_line(error)}") from None
     if missing := [name for name in ("part", *COLUMNS) if name not in table]:
         raise EchoError(f"{file}: has no column {missing[0]}: give part, lateral_px and axial_px")
     if unknown := sorted(set(table["part"].astype(str)) - set(PARTS)):
