@@ -4,9 +4,11 @@ import json
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from importlib.metadata import distributions
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 MAKE = (
@@ -41,6 +43,17 @@ def explained(what: str) -> Iterator[None]:
         if isinstance(error, MissingPackage) or package not in MAKE:
             raise
         raise MissingPackage(f"{what} needs the package {package}: {installation('make')}", name=package) from None
+
+
+def optional(package: str, extra: str, error: type[Exception], of: str = "") -> Any:
+    """Import a package of an extra, or raise an error that says what needs it (`of`, as it begins) and how to get it.
+
+    It is for what a call may or may not need; :func:`explained` for what a whole command needs.
+    """
+    try:
+        return import_module(package)
+    except ImportError:
+        raise error(f"{of}needs the package {package}: {installation(extra)}") from None
 
 
 def require(package: str) -> None:

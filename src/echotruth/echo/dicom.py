@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from echotruth.arrays import Floats
-from echotruth.echo.failure import FEWEST_FRAMES, EchoError, optional, reading
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, reading
 from echotruth.echo.recording import Recording, grey
+from echotruth.extras import optional
 
 TWO_DIMENSIONAL, CENTIMETRES = 1, 3
 """Spatial format of a region that is an image, and unit of its directions (PS3.3 C.8.5.5.1)."""
@@ -35,7 +36,7 @@ def read(path: Path) -> Recording:
     EchoError
         If pydicom is not installed, or the file holds no clip that it can decode.
     """
-    pydicom = optional("pydicom", path)
+    pydicom = optional("pydicom", "clinical", EchoError, f"{path}: ")
     with reading(path, "no DICOM clip that can be decoded"):
         image = pydicom.dcmread(path)
         pixels = np.asarray(image.pixel_array)

@@ -2,11 +2,8 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
-
-from echotruth.extras import installation
 
 FACTS = {"spacing_mm": "the side of its pixels", "frame_time_ms": "the time from frame to frame", "view": "its view"}
 """Options that say what a file may not, and what that is."""
@@ -37,11 +34,3 @@ def reading(path: Path, fault: str) -> Iterator[None]:
         raise
     except Exception as error:  # most libraries have no common type for what is wrong with a file
         raise EchoError(f"{path}: is {fault}: {' '.join(str(error).split())[:200]}") from None
-
-
-def optional(package: str, path: Path) -> Any:
-    """Import an optional package that reads a file, or raise an :class:`EchoError` that says how to install it."""
-    try:
-        return import_module(package)
-    except ImportError:
-        raise EchoError(f"{path}: needs the package {package}: {installation('clinical')}") from None

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from echotruth.echo import dicom, echoxflow
-from echotruth.echo.failure import FEWEST_FRAMES, EchoError, optional, reading
+from echotruth.echo.failure import FEWEST_FRAMES, EchoError, reading
 from echotruth.echo.recording import Recording, check_size, grey
+from echotruth.extras import optional
 
 IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 """Endings of the images of a folder, of which each is a frame, in the order of the numbers in their names."""
@@ -128,7 +129,7 @@ def _video(path: Path) -> Recording:
 
 def _nifti(path: Path) -> Recording:
     """Frames of (lateral, axial, 1, frame) or (lateral, axial, frame), with their scale."""
-    nibabel = optional("nibabel", path)
+    nibabel = optional("nibabel", "clinical", EchoError, f"{path}: ")
     with reading(path, "no NIfTI file that can be read"):
         image = nibabel.load(path)
         pixels = np.asarray(image.dataobj)

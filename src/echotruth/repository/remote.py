@@ -12,7 +12,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from echotruth.extras import installation
+from echotruth.extras import optional
 
 if TYPE_CHECKING:
     from obstore.store import S3Store
@@ -52,11 +52,7 @@ class Remote:
     def __init__(self, url: str) -> None:
         if not re.fullmatch(r"s3://[^/\s]+(/\S*)?", url):
             raise RemoteError(f"{url}: is not an address in object storage: give s3://BUCKET/FOLDER")
-        try:
-            import obstore
-        except ImportError:
-            raise RemoteError(f"{url}: needs the package obstore: {installation('s3')}") from None
-        self.url, self._api = url.rstrip("/"), obstore
+        self.url, self._api = url.rstrip("/"), optional("obstore", "s3", RemoteError, f"{url}: ")
         self.store = self._asked(lambda: _store(self.url))
 
     def __reduce__(self) -> tuple[type[Remote], tuple[str]]:

@@ -13,8 +13,9 @@ from uuid import UUID
 import numpy as np
 
 import echotruth
+from echotruth.extras import optional
 from echotruth.sharing.export.clip import ExportedClip
-from echotruth.sharing.export.error import optional
+from echotruth.sharing.export.error import ExportError
 from echotruth.units import MHz
 
 US_MULTI_FRAME = "1.2.840.10008.5.1.4.1.1.3.1"
@@ -47,7 +48,7 @@ def write(clip: ExportedClip, path: Path) -> None:
     ExportError
         If pydicom is not installed.
     """
-    pydicom = optional("pydicom")
+    pydicom = optional("pydicom", "clinical", ExportError)
     image = pydicom.Dataset()
     _subject(image, clip)
     _series(image, clip)

@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from echotruth.extras import optional
 from echotruth.sharing.export.clip import ExportedClip
-from echotruth.sharing.export.error import optional
+from echotruth.sharing.export.error import ExportError
 
 MM = 1e3
 """Millimetres in a metre."""
@@ -32,7 +33,7 @@ def write(clip: ExportedClip, path: Path) -> None:
     ExportError
         If nibabel is not installed.
     """
-    nibabel = optional("nibabel")
+    nibabel = optional("nibabel", "clinical", ExportError)
     grey = clip.image if clip.image.ndim == 4 else clip.image[:, :, None]
     image = nibabel.Nifti1Image(np.ascontiguousarray(grey.transpose(3, 1, 2, 0)), None)
     image.header.set_xyzt_units("mm", "sec")

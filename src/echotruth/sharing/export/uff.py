@@ -14,8 +14,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
+from echotruth.extras import optional
 from echotruth.sharing.export.clip import ExportedClip
-from echotruth.sharing.export.error import optional
+from echotruth.sharing.export.error import ExportError
 from echotruth.sharing.export.rf import open_rf, sample_positions, scaled_channels
 
 VERSION = "v1.2.0"
@@ -27,7 +28,7 @@ SPHERICAL = 1
 
 def write(clip: ExportedClip, path: Path) -> None:
     """Write the lines of a view as `beamformed_data`, and its channels, if they are kept, as `channel_data`."""
-    h5py = optional("h5py")
+    h5py = optional("h5py", "export", ExportError)
     with h5py.File(path, "w") as file:
         rf = open_rf(clip)
         file.attrs["version"] = np.array([VERSION], h5py.string_dtype())

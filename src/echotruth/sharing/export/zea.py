@@ -11,8 +11,9 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from echotruth.arrays import Floats
+from echotruth.extras import optional
 from echotruth.sharing.export.clip import ExportedClip
-from echotruth.sharing.export.error import optional
+from echotruth.sharing.export.error import ExportError
 from echotruth.sharing.export.rf import open_rf, sample_positions, scaled_channels
 
 VERSION = "0.1.8"
@@ -24,7 +25,7 @@ SOURCE_DISTANCE = 1e-6
 
 def write(clip: ExportedClip, path: Path) -> None:
     """Write the lines of a view as `beamformed_data`, and its channels, if they are kept, as `raw_data`."""
-    with optional("h5py").File(path, "w") as file:
+    with optional("h5py", "export", ExportError).File(path, "w") as file:
         rf = open_rf(clip)
         file.attrs.update(zea_version=VERSION, us_machine="echotruth", description="Simulated echocardiogram")
         _probe(file.create_group("probe"), rf)

@@ -11,7 +11,7 @@ from PIL import Image
 from echotruth.arrays import Floats
 from echotruth.config.loading import checked, read_yaml
 from echotruth.config.tracking import Onnx, OnnxSignature
-from echotruth.extras import MissingPackage, installation
+from echotruth.extras import MissingPackage, optional
 from echotruth.tracking.external_program import in_one_line
 from echotruth.tracking.failure import TrackerFailed
 from echotruth.tracking.grey import grey_levels
@@ -158,10 +158,7 @@ def _session(path: Path) -> tuple[Any, Any]:
     """Session on one core, because sums of several threads may differ in last digits, and options of its calls."""
     if not path.is_file():
         raise TrackerFailed(f"{path}: is not there: give the path of a model in ONNX")
-    try:
-        import onnxruntime
-    except ModuleNotFoundError:
-        raise MissingPackage(f"{path} needs the package onnxruntime: {installation('onnx')}") from None
+    onnxruntime = optional("onnxruntime", "onnx", MissingPackage, f"{path} ")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.use_deterministic_compute = True
