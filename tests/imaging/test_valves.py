@@ -176,7 +176,7 @@ def test_papillary_muscles_are_as_dense_as_muscle_in_the_cavity_and_attached_to_
 
 def test_cusps_meet_on_the_axis_when_shut_and_stand_beside_the_walls_when_open(heart):
     valve, azimuth = AorticValve(heart), np.linspace(0, 2 * np.pi, 12, endpoint=False)
-    places = {frame: valve.ring(frame).to_ring(valve.cusp(frame, azimuth, np.ones(12))) for frame in (0, EJECTING)}
+    places = {frame: valve.ring(frame).to_ring(valve.leaflet(frame, azimuth, np.ones(12))) for frame in (0, EJECTING)}
     radius = {frame: np.hypot(*place[:, :2].T) for frame, place in places.items()}
     assert radius[0].max() < 0.05 and (radius[EJECTING] > 0.9).all() and (radius[EJECTING] < 1).all()
     assert (places[EJECTING][:, 2] > places[0][:, 2]).all()

@@ -8,7 +8,6 @@ revolution, angles and thickness were chosen by eye.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import atan2, hypot, pi, radians
 from typing import Self
 
@@ -22,7 +21,7 @@ from echotruth.imaging.medium import arc
 from echotruth.imaging.medium.annulus import Rim, box_of
 from echotruth.imaging.medium.aortic_root import valve_ring
 from echotruth.imaging.medium.body import Scene
-from echotruth.imaging.medium.borders import border_amplitude, border_density
+from echotruth.imaging.medium.borders import border_density
 from echotruth.imaging.medium.chamber_valve import AZIMUTH, ChamberLeaflets, ChamberValve
 from echotruth.imaging.medium.filling import aortic_opening, course
 
@@ -59,7 +58,7 @@ class AorticValve(ChamberValve):
         """Lowest and highest coordinates, (3,), m, in the heart frame, that the cusps reach in any frame."""
         return box_of(self.rings, np.array([-1.1, -1.1, -0.1]), np.array([1.1, 1.1, _length() + 0.1]))
 
-    def cusp(self, frame: int, azimuth: Floats, share: Floats) -> Floats:
+    def leaflet(self, frame: int, azimuth: Floats, share: Floats) -> Floats:
         """Points of the cusps in a frame, (n, 3), m, at azimuths (n,), rad, and shares (n,) of their length."""
         inward, up = (_length() * arc.points(*self.angles(frame), share)).T
         radius = 1 - inward
@@ -87,8 +86,7 @@ class AorticCusps(ChamberLeaflets):
     """
 
     name = "aortic_cusps"
-    place: Floats
-    amplitude: Floats
+    valve = AorticValve
 
     @classmethod
     def seed(cls, scene: Scene) -> Self:
@@ -96,19 +94,7 @@ class AorticCusps(ChamberLeaflets):
         random, radius = scene.random(cls.name), AorticValve(scene.heart).ring(0).radius
         number = random.poisson(border_density(scene.config) * 2 * pi * _length() * radius**2)
         azimuth, share = random.uniform(0, 2 * pi, number), random.random(number)
-        place = np.column_stack([azimuth, share])[random.random(number) > NARROWING * share]
-        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config))
-        return cls(scene, place, np.full(len(place), amplitude))
-
-    def in_heart(self, frame: int) -> Floats:
-        return self._valve.cusp(frame, *self.place.T)
-
-    def amplitudes(self, frame: int) -> Floats:
-        return self.amplitude
-
-    @cached_property
-    def _valve(self) -> AorticValve:
-        return AorticValve(self.scene.heart, self.scene.between)
+        return cls.at(scene, np.column_stack([azimuth, share])[random.random(number) > NARROWING * share])
 
 
 def _length() -> float:

@@ -1,8 +1,9 @@
 """Valves of the neighbouring chambers: hinged at a ring that follows the base, with leaflets that are arcs alike."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from echotruth.config import Config
 from echotruth.heart import Heart
 from echotruth.imaging.labels import TissueLabel
 from echotruth.imaging.medium.annulus import Ring
-from echotruth.imaging.medium.body import CavityBody
+from echotruth.imaging.medium.body import CavityBody, Scene
+from echotruth.imaging.medium.borders import border_amplitude
 from echotruth.imaging.medium.surroundings import SurroundingsMotion
 
 AZIMUTH = np.linspace(0, 2 * pi, 12, endpoint=False)
@@ -74,7 +76,25 @@ class ChamberLeaflets(CavityBody):
     """Scatterers of such a valve; they have the level of the mitral leaflets, if there are chambers."""
 
     level = "neighbours.leaflets_dB"
+    valve: ClassVar[Any]
+    place: Floats
+    amplitude: Floats
 
     @classmethod
     def level_dB(cls, config: Config) -> Any:
         return None if config.realism.neighbours.chambers_dB is None else super().level_dB(config)
+
+    @classmethod
+    def at(cls, scene: Scene, place: Floats) -> Self:
+        """Scatterers at places in the leaflets, with amplitudes of a border of the level."""
+        return cls(scene, place, np.full(len(place), border_amplitude(scene.config, cls.level_dB(scene.config))))
+
+    def in_heart(self, frame: int) -> Floats:
+        return self._valve.leaflet(frame, *self.place.T)
+
+    def amplitudes(self, frame: int) -> Floats:
+        return self.amplitude
+
+    @cached_property
+    def _valve(self) -> Any:
+        return self.valve(self.scene.heart, self.scene.between)

@@ -9,7 +9,6 @@ the mitral valve; here the whole annulus is, by 5 mm. All lengths and angles wer
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import atan2, hypot, radians
 from typing import Self
 
@@ -23,7 +22,7 @@ from echotruth.imaging.medium import arc
 from echotruth.imaging.medium.anatomy import RIGHT_ATRIUM, anatomy_of
 from echotruth.imaging.medium.annulus import box_of
 from echotruth.imaging.medium.body import Scene
-from echotruth.imaging.medium.borders import border_amplitude, border_density
+from echotruth.imaging.medium.borders import border_density
 from echotruth.imaging.medium.chamber_valve import AZIMUTH, ChamberLeaflets, ChamberValve
 from echotruth.imaging.medium.filling import course, opening
 
@@ -96,8 +95,7 @@ class TricuspidLeaflets(ChamberLeaflets):
     """
 
     name = "tricuspid_leaflets"
-    place: Floats
-    amplitude: Floats
+    valve = TricuspidValve
 
     @classmethod
     def seed(cls, scene: Scene) -> Self:
@@ -106,19 +104,7 @@ class TricuspidLeaflets(ChamberLeaflets):
         number = random.poisson(border_density(scene.config) * 8 * _length() * radius**2)
         side, across = np.where(random.random(number) < 0.5, -1.0, 1.0), random.uniform(-1, 1, number)
         place = np.column_stack([side, across, random.random(number)])
-        place = place[random.random(number) < np.sqrt(1 - across**2)]
-        amplitude = border_amplitude(scene.config, cls.level_dB(scene.config))
-        return cls(scene, place, np.full(len(place), amplitude))
-
-    def in_heart(self, frame: int) -> Floats:
-        return self._valve.leaflet(frame, *self.place.T)
-
-    def amplitudes(self, frame: int) -> Floats:
-        return self.amplitude
-
-    @cached_property
-    def _valve(self) -> TricuspidValve:
-        return TricuspidValve(self.scene.heart, self.scene.between)
+        return cls.at(scene, place[random.random(number) < np.sqrt(1 - across**2)])
 
 
 def _length() -> float:
