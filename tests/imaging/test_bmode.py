@@ -14,14 +14,13 @@ from echotruth.imaging.bmode import (
     downsample,
     dropout_gain,
     eight_bit,
-    enhance_edges,
     envelope,
     envelope_images,
     largest_clip,
     log_compress,
     persist,
     pixel_centres,
-    smooth,
+    sharpened,
     time_gain_compensation,
 )
 
@@ -202,9 +201,9 @@ def test_edges_are_enhanced_within_the_scan_alone():
     inside = np.zeros((60, 60), bool)
     inside[10:50, 10:50] = True
     flat = np.where(inside, 0.5, 0.0)
-    assert np.allclose(enhance_edges(flat, inside, 2.0, 3.0), flat)
+    assert np.allclose(sharpened(flat, inside, 2.0, 3.0), flat)
     step = np.where(inside, np.where(np.arange(60) < 30, 0.3, 0.7), 0.0)
-    sharp = enhance_edges(step, inside, 1.0, 2.0)
+    sharp = sharpened(step, inside, 1.0, 2.0)
     assert np.allclose(sharp[30, [12, 47]], [0.3, 0.7], atol=1e-6)
     # Half a pixel beside a step of 0.4 its Gaussian mean is 0.2 erf(0.5 / (2 sqrt 2)) from the middle.
     assert sharp[30, [29, 30]] == pytest.approx([0.1 + 0.0395, 0.9 - 0.0395], abs=2e-3)
@@ -215,12 +214,12 @@ def test_smoothing_is_within_the_scan_alone():
     inside = np.zeros((60, 60), bool)
     inside[10:50, 10:50] = True
     noise = np.where(inside, np.random.default_rng(1).random((60, 60)), 0.0)
-    mean = smooth(noise, inside, 1.0, 2.0)
+    mean = sharpened(noise, inside, -1.0, 2.0)
     # White noise averaged by a Gaussian of standard deviation s keeps 1 / (4 pi s^2) of its variance.
     middle = np.s_[16:44, 16:44]
     assert mean[middle].std() == pytest.approx(noise[middle].std() / np.sqrt(16 * np.pi), rel=0.25)
     assert mean[middle].mean() == pytest.approx(noise[middle].mean(), abs=0.02)
-    half = smooth(noise, inside, 0.5, 2.0)
+    half = sharpened(noise, inside, -0.5, 2.0)
     assert np.allclose(half, (noise + mean) / 2) and (half[~inside] == 0).all()
 
 

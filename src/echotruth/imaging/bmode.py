@@ -218,8 +218,8 @@ def persist(levels: np.ndarray, weight: float, is_closed: bool = True) -> np.nda
     return shown
 
 
-def smooth(level: np.ndarray, inside: np.ndarray, share: float, width_px: float) -> np.ndarray:
-    """Mixture (1 - s) x + s (Gaussian mean of x) within the scan, which reduces speckle.
+def sharpened(level: np.ndarray, inside: np.ndarray, amount: float, width_px: float) -> np.ndarray:
+    """x + a (x - Gaussian mean of x) within the scan: an unsharp mask where a > 0, less speckle where a < 0.
 
     Parameters
     ----------
@@ -228,27 +228,10 @@ def smooth(level: np.ndarray, inside: np.ndarray, share: float, width_px: float)
     inside
         Pixels of the scan (axial, lateral), bool. The mean is that over these alone, so that the edge of the scan is no
         edge of the image; others stay what they are.
-    share
-        Share s of the mean, 0 to 1.
+    amount
+        Factor a, from -1.
     width_px
         Standard deviation of the Gaussian, px.
-
-    Returns
-    -------
-    Same shape and type.
-    """
-    return np.where(inside, level - share * _detail(level, inside, width_px), level)
-
-
-def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px: float) -> np.ndarray:
-    """Unsharp mask within the scan: x + a (x - Gaussian mean of x).
-
-    Parameters
-    ----------
-    level, inside, width_px
-        As of :func:`smooth`.
-    amount
-        Factor a, 0 or more.
 
     Returns
     -------
@@ -258,7 +241,7 @@ def enhance_edges(level: np.ndarray, inside: np.ndarray, amount: float, width_px
 
 
 def _detail(level: np.ndarray, inside: np.ndarray, width_px: float) -> np.ndarray:
-    """Difference of an image from its Gaussian mean over the pixels of the scan; parameters as of :func:`smooth`."""
+    """Difference of an image from its Gaussian mean over the pixels of the scan; parameters as of :func:`sharpened`."""
     from scipy.ndimage import gaussian_filter  # takes longer to import than all else here
 
     weight = gaussian_filter(inside.astype(level.dtype), width_px)
@@ -394,8 +377,8 @@ def grey_images(images: np.ndarray, inside: np.ndarray, bmode: Bmode, is_closed:
 
 def _filtered(level: np.ndarray, inside: np.ndarray, bmode: Bmode) -> np.ndarray:
     """Grey levels (axial, lateral), smoothed and then with enhanced edges, as asked for."""
-    if bmode.smoothing:
-        level = smooth(level, inside, bmode.smoothing, bmode.smoothing_width_px)
-    if bmode.edge_enhancement:
-        level = enhance_edges(level, inside, bmode.edge_enhancement, bmode.edge_width_px)
+    steps = (-bmode.smoothing, bmode.smoothing_width_px), (bmode.edge_enhancement, bmode.edge_width_px)
+    for amount, width_px in steps:
+        if amount:
+            level = sharpened(level, inside, amount, width_px)
     return level
