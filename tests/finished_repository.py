@@ -130,7 +130,7 @@ def blank(job: Job) -> Result:
         groups, job.notes["bounded"] = _moved(config.model_dump_json())
         return groups
     if job.stage == "inference":
-        return {group: _zeros(group, job.config) for group in schema.INFERENCE}
+        return {group: _zeros(group, job.config) for group in schema.KINDS if group.startswith("inference/")}
     return {group: seen(job, _zeros(group, job.config)) for group in job.groups()}
 
 

@@ -17,7 +17,7 @@ from benchmarks.suite.hearts import SuiteCase, cases_of, plan
 from benchmarks.suite.scores import view_rows
 from echotruth.config.imaging import ViewMotion
 from echotruth.extras import MissingPackage
-from echotruth.repository.version import motion_hash
+from echotruth.repository.version import version_of
 from echotruth.workflow import instructions
 
 GROUPS = {"healthy", "infarct", "late_activation", "hypertrophy", "dilation"}
@@ -63,10 +63,10 @@ def test_case_is_what_its_labels_say(cases):
 def test_ideal_case_has_the_motion_and_the_planes_of_the_realistic_one_and_no_drawn_condition(cases):
     ideal = {one.sorts["heart"]: one for one in cases if one.sorts["acoustics"] == "ideal"}
     real = {one.sorts["heart"]: one for one in cases if one.sorts["acoustics"] == "realistic"}
-    assert len(ideal) >= 16 and len({motion_hash(one.case.config) for one in real.values()}) == len(real)
+    assert len(ideal) >= 16 and len({version_of("mechanics", one.case.config) for one in real.values()}) == len(real)
     for heart, one in ideal.items():
         config, other = one.case.config, real[heart].case.config
-        assert motion_hash(config) == motion_hash(other) and config.views == other.views
+        assert version_of("mechanics", config) == version_of("mechanics", other) and config.views == other.views
         assert real[heart].sorts["variation"] == "none"
 
 

@@ -7,7 +7,7 @@ few hearts they are too narrow: of normal values, those of the mean of 6, 12 and
 cases, those of the median in 93, 94 and 94.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
@@ -20,9 +20,6 @@ RESAMPLES = 2000
 
 LEVELS = (0.025, 0.975)
 """Quantiles at which an interval ends."""
-
-STATISTICS: dict[str, Callable[..., Floats]] = {"mean": np.mean, "median": np.median}
-"""What is said of the values of the hearts; a value that is not known makes it unknown."""
 
 
 CLIP = ("repository", "case", "view", "size_px")
@@ -41,8 +38,8 @@ def draws(hearts: int, seed: int) -> NDArray[np.int64]:
     return np.random.default_rng(seed).integers(hearts, size=(RESAMPLES, hearts))
 
 
-def interval(values: Floats, resamples: NDArray[np.integer], statistic: str = "mean") -> tuple[Floats, Floats]:
-    """Bootstrap interval of the mean or median over hearts.
+def interval(values: Floats, resamples: NDArray[np.integer]) -> tuple[Floats, Floats]:
+    """Bootstrap interval of the mean over hearts.
 
     Parameters
     ----------
@@ -50,7 +47,6 @@ def interval(values: Floats, resamples: NDArray[np.integer], statistic: str = "m
         Any unit.
     resamples : ndarray of shape (sample, heart), integer
         Indices of the hearts drawn with replacement.
-    statistic : {"mean", "median"}
 
     Returns
     -------
@@ -59,7 +55,7 @@ def interval(values: Floats, resamples: NDArray[np.integer], statistic: str = "m
     """
     if len(values) < 2:
         return np.full(values.shape[1], np.nan), np.full(values.shape[1], np.nan)
-    return percentiles(STATISTICS[statistic](values[resamples], axis=1), len(values))
+    return percentiles(np.mean(values[resamples], axis=1), len(values))
 
 
 def percentiles(samples: Floats, hearts: int) -> tuple[Floats, Floats]:

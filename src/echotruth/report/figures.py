@@ -118,9 +118,9 @@ class Figures:
         picture = np.asarray(Image.open(self.folder / "clip.png").convert("RGB").resize((720, 102)))
         self._film(picture[None])
 
-    def group(self, path: str, view: str | None = None) -> dict[str, NDArray[Any]]:
+    def group(self, path: str) -> dict[str, NDArray[Any]]:
         """Arrays of a group for the heart that is shown."""
-        return self.repository.arrays(path, self.case, view)
+        return self.repository.arrays(path, self.case)
 
     @cached_property
     def shown(self) -> Heart:

@@ -96,11 +96,6 @@ class Repository:
         return "\n".join([f"Repository {self.config.name}", *(f"  {name:8}  {text}" for name, text in lines.items())])
 
     @property
-    def is_remote(self) -> bool:
-        """Whether it is in object storage."""
-        return self._remote is not None
-
-    @property
     def location(self) -> str:
         """Folder, or address in object storage."""
         return self._place if self._remote else str(self._folder)

@@ -38,9 +38,6 @@ SCORES = {array.name: array for array in KINDS.pop("scores")}
 HEART = ("geometry", "fibres", "pathology", "mechanics", "kinematics", "physiology")
 """Groups of a heart, which the stage mechanics writes."""
 
-INFERENCE = tuple(kind for kind in KINDS if kind.startswith("inference/"))
-"""Groups of what is inferred of the heart of a case, those of ArviZ's InferenceData among them."""
-
 CHAINS, DRAWS = 1, 512
 """Of what is inferred; draws do not depend on each other, so that one chain has them all."""
 

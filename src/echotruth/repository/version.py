@@ -20,18 +20,8 @@ from echotruth.repository.code import code_hash
 from echotruth.section import Section
 
 PACKAGES = (
-    "echotruth",
-    "numpy",
-    "scipy",
-    "numba",
-    "scikit-image",
-    "pypardiso",
-    "mkl",
-    "meshio",
-    "vtk",
-    "xarray",
-    "zarr",
-    "onnxruntime",
+    *("echotruth", "numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio"),
+    *("vtk", "xarray", "zarr", "onnxruntime"),
 )
 """Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 
@@ -153,35 +143,17 @@ def report_version(folder: Path) -> str:
     return settings_hash(checksum(folder / CHECKSUMS), code_hash("report"))
 
 
-def motion_hash(config: Config) -> str:
-    """Hash of what the motion of a heart depends on: the same for hearts that move alike."""
-    return settings_hash(*_motion(config), *_content(config))
-
-
-def _motion(config: Config) -> Settings:
-    """What the motion of a heart depends on, besides the content of the files that it names."""
+def _mechanics(config: Config, view: str, tracker: str) -> Settings:
+    """What the motion of a heart depends on, with the content of the files that it names."""
     # Only fibre disarray depends on the seed.
     seed = config.seed if config.fibres.disarray_deg else None
     anatomy = (config.geometry.resolved(), config.fibres, seed, config.pathology.resolved())
-    if config.motion.kind == "beat":
-        return (*anatomy, config.loop, config.mechanics)
-    formula = getattr(config.motion, config.motion.kind)
-    return (*anatomy, _times(config.loop), config.motion.time_course, formula, config.rf.focus_mm)
-
-
-def _content(config: Config) -> Settings:
-    """What the files that a heart names hold."""
-    found: list[Any] = [_mesh_hash(config.geometry)]
-    if config.motion.kind == "beat":
-        found.append(_curves(config.loop, size(config)))
-    if config.motion.kind == "file":
-        found.append(_series_hash(str(config.motion.file.path)))
-    return tuple(found)
-
-
-def _mechanics(config: Config, view: str, tracker: str) -> Settings:
-    """What a heart depends on."""
-    return *_motion(config), *_content(config)
+    kind, mesh = config.motion.kind, _mesh_hash(config.geometry)
+    if kind == "beat":
+        return (*anatomy, config.loop, config.mechanics, mesh, _curves(config.loop, size(config)))
+    prescribed = (_times(config.loop), config.motion.time_course, getattr(config.motion, kind), config.rf.focus_mm)
+    series = [_series_hash(str(config.motion.file.path))] if kind == "file" else []
+    return (*anatomy, *prescribed, mesh, *series)
 
 
 def _phantom(config: Config, view: str, tracker: str) -> Settings:
