@@ -273,8 +273,6 @@ def downsample(images: np.ndarray, divisor: int) -> np.ndarray:
     Shape (..., axial / divisor, lateral / divisor), uint8. Halves are rounded to even, so that there is no bias.
     """
     *rest, rows, columns = images.shape
-    if rows % divisor or columns % divisor:
-        raise ValueError(f"An image of {rows} x {columns} px cannot be divided into blocks of {divisor} px.")
     blocks = images.reshape(*rest, rows // divisor, divisor, columns // divisor, divisor)
     return np.rint(blocks.mean(axis=(-3, -1), dtype=np.float32)).astype(np.uint8)
 

@@ -23,7 +23,8 @@ from echotruth.inference.observation import ObservationError
 from echotruth.inference.parameters import Given
 from echotruth.inference.segment_means import SEGMENTS, SegmentMeans
 from echotruth.notebook.simulation import progress_line
-from echotruth.repository.inferred import MISFIT, unit
+from echotruth.repository.inferred import MISFIT
+from echotruth.units import unit_of
 
 MESH = (12, 8, 2)
 """Elements around, along and through the wall of the model."""
@@ -163,7 +164,8 @@ def _dataset(observed: xr.Dataset, every: Modes, segments: SegmentMeans) -> xr.D
         "scar_probability": ("aha", np.where(tried & shown, draws.scar.mean(axis=0), np.nan)),
     }
     labels: dict[str, Any] = {name: ("observation", observed[name].values) for name in ("quantity", "view")}
-    labels |= {"segment": ("observation", observed["aha"].values), "unit": ("parameter", [unit(one) for one in names])}
+    units = [unit_of(one) or "1" for one in names]
+    labels |= {"segment": ("observation", observed["aha"].values), "unit": ("parameter", units)}
     about = {name: value for name, value in observed.attrs.items() if name != "config"}
     about |= {
         "misfit_probability": best.found.misfit,

@@ -143,7 +143,7 @@ def calibrate(cycle: Cycle, settings: Settings) -> tuple[Circulation, Cycle]:
     shut = pressure - pressures[:, ARTERIES]
     head[:, LEFT_VENTRICLE] = -np.maximum(_held(ejecting, ejects), np.where(ejects, -np.inf, shut))
     shut = pressure - pressures[:, LEFT_ATRIUM]
-    head[:, LEFT_ATRIUM] = np.minimum(_between(filling, fills), np.where(fills, np.inf, shut))
+    head[:, LEFT_ATRIUM] = np.minimum(_held(filling, fills, len(filling)), np.where(fills, np.inf, shut))
     conductance[LEFT_VENTRICLE] = 1 / (aortic_valve + characteristic)
     conductance[LEFT_ATRIUM] = 1 / mitral_resistance
     volumes = steady.copy()
@@ -262,13 +262,7 @@ def _periodic(kept: float, gained: float, flow: Floats) -> Floats:
     return np.array(found) + first * kept ** np.arange(1, len(flow) + 1)
 
 
-def _held(values: Floats, known: NDArray[np.bool_]) -> Floats:
-    """Values between those known, and before and after them the first and the last."""
+def _held(values: Floats, known: NDArray[np.bool_], period: int | None = None) -> Floats:
+    """Values between those known; before and after them the first and the last, or what the period says."""
     frames = np.flatnonzero(known)
-    return np.interp(np.arange(len(values)), frames, values[frames])
-
-
-def _between(values: Floats, known: NDArray[np.bool_]) -> Floats:
-    """Values between those known of a periodic curve."""
-    frames = np.flatnonzero(known)
-    return np.interp(np.arange(len(values)), frames, values[frames], period=len(values))
+    return np.interp(np.arange(len(values)), frames, values[frames], period=period)

@@ -10,7 +10,7 @@ import pandas as pd
 
 from echotruth.repository import schema
 from echotruth.repository.choice import image_size
-from echotruth.units import UNITS
+from echotruth.units import unit_of
 
 if TYPE_CHECKING:
     from echotruth.repository.reader import Repository
@@ -35,12 +35,6 @@ MISFIT = 0.01
 
 FILE = "inference.csv"
 """Name of the table in the folder of a repository."""
-
-
-def unit(parameter: str) -> str:
-    """Unit of a parameter, by its name; 1 if it has none."""
-    found = parameter.rpartition("_")[2]
-    return found if found in UNITS else "1"
 
 
 def hearts(repository: Repository) -> list[str]:
@@ -95,7 +89,7 @@ def rows(fit: dict[str, Any]) -> list[dict[str, Any]]:
     return [
         {
             "parameter": name,
-            "unit": unit(name),
+            "unit": unit_of(name) or "1",
             "identifiable": bool(fit["identifiable"][place]),
             "scar_probability": _of_segment(name, fit["scar_probability"]),
             **{column: float(fit[column][place]) for column in names},
