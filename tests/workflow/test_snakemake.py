@@ -73,11 +73,23 @@ def test_graph_of_rules_is_the_way_of_a_view_and_nothing_is_written(tmp_path):
     assert not workspace.out.exists()
 
 
+@pytest.mark.slow
+def test_workflow_of_ones_own_takes_over_the_rules_as_the_page_says(tmp_path):
+    page = (ROOT / "docs/workflow.md").read_text().partition("## A rule of your own")[2]
+    snakefile, script = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[:2]
+    workspace = Workspace(tmp_path / "own", CONFIG.replace("name: tiny", "name: mine"))
+    (workspace.folder / "tiny.yaml").rename(workspace.folder / "mine.yaml")
+    (workspace.folder / "Snakefile").write_text(snakefile)
+    (workspace.folder / "volumes.py").write_text(script)
+    workspace.run(sys.executable, "-m", "snakemake", "--cores", "2", "all", "volumes")
+    assert len((workspace.folder / "out/mine/volumes.csv").read_text().splitlines()) == 1 + 3
+
+
 def parsed(code: str, folder: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     """Run the Python at the beginning of the Snakefile, up to where it reads the configuration, and then code."""
     text = (ROOT / "Snakefile").read_text()
     start = text[: text.index("if not config:")]
-    given = f"from types import SimpleNamespace\nworkflow = SimpleNamespace(basedir={str(ROOT)!r})\n"
+    given = f"from types import SimpleNamespace\nworkflow = SimpleNamespace(current_basedir={str(ROOT)!r})\n"
     environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", VARIABLE)}
     command = [sys.executable, "-c", given + start + code]
     return subprocess.run(command, cwd=folder, env=environment | variables, capture_output=True, text=True, check=True)
