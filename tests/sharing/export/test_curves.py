@@ -1,5 +1,7 @@
 """Curves as CSV, read by pandas."""
 
+import shutil
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -66,6 +68,17 @@ def test_only_chosen_trackers_have_rows(known, tmp_path):
     work = Export(Repository(known.folder), "csv", views=["mid"], trackers=["two"], output=tmp_path)
     (file,) = work.write(work.clips()[0])
     assert set(pd.read_csv(file, keep_default_na=False)["tracker"]) == {"", "two"}
+
+
+def test_tracker_that_was_run_on_one_view_has_rows_of_that_alone(known, tmp_path):
+    folder = shutil.copytree(known.folder, tmp_path / known.folder.name)
+    (tracked,) = folder.glob("*.zarr/clips/*/long/tracking/two")
+    shutil.rmtree(tracked)
+    work = Export(Repository(folder), "csv", output=tmp_path / "csv")
+    tables = {file.stem: pd.read_csv(file, keep_default_na=False) for file in work.write(work.clips()[0])}
+    found = {name: set(table["tracker"]) for name, table in tables.items()}
+    assert {"two" in trackers for name, trackers in found.items() if "long" in name} == {False}
+    assert {"two" in trackers for name, trackers in found.items() if "mid" in name} == {True}
 
 
 def test_summary_of_all_clips_stands_beside_their_curves(known, tmp_path):

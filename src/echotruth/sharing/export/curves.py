@@ -44,9 +44,12 @@ def write(clip: ExportedClip, path: Path, trackers: Sequence[str]) -> None:
     clip : ExportedClip
     path : Path
     trackers : sequence of str
+        Those that were not run on the clip are left out.
     """
     parts = [*_heart(clip), *_heart_strain(clip)]
     for tracker in trackers:
+        if not clip.repository.attributes(f"tracking/{tracker}", clip.case.id, clip.view):
+            continue
         curves = clip.repository.curves(clip.case.id, clip.view, tracker, clip.size)
         parts += [part.assign(tracker=tracker) for part in _tracked(curves)]
     table = pd.concat(parts, ignore_index=True)
