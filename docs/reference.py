@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable
 from math import log2
 from pathlib import Path
-from typing import Any, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -65,8 +65,9 @@ heart, a clip or a group; `echotruth.Repository` reads it by case, view and size
 
 Files beside it, in `out/NAME`: `config.yaml`, `cases.csv` (the cases with status, heart, labels and all keys),
 `cases/CASE.json` (the configuration of each), `SHA256SUMS` (checksum of every file), `report.html` and `figures/`,
-`logs/` and `benchmarks/` (time and memory of every job), `drafts/` (what jobs are writing), and `trackers.yaml`
-(settings of the trackers that `echotruth evaluate` added).
+`logs/` and `benchmarks/` (time and memory of every job), `drafts/` (what jobs are writing), `inference.csv` (what was
+inferred), `trackers.yaml` (settings of the trackers that `echotruth evaluate` added), and `export/` (what `echotruth
+export` wrote).
 
 - **Attributes of a group:** `status` (complete; failed: the heart has no solution; skipped: the heart is not
   imaged), `reason` (why it is not complete; then it has no arrays), `version` (a hash of the settings and the code
@@ -103,8 +104,8 @@ and `.metrics()` read them as tables.
 
 _DERIVED = """What follows from the stored arrays is not stored. `echotruth.kinematics(heart)` gives the arrays
 below, for a heart that `echotruth.Repository.heart` reads or `echotruth.beat` makes. `echotruth.Repository.tracks`
-gives, at the points of the trackers, the strain of a tracked motion by the operator of `tracking.md`, and their layer
-and segment.
+gives, at the points of the trackers, the strain of a tracked motion
+([tracked strain](conventions.md#tracked-strain)), and their layer and segment.
 """
 
 
@@ -161,7 +162,8 @@ def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -
             continue
         subsection = None if sections else section_in(field.annotation)
         if subsection is None or mapping:
-            rows.append(f"| `{prefix}{key}` | {_default(field)} | {_meaning(model, key)} |")
+            meaning = _meaning(model, key)
+            rows.append(f"| `{prefix}{key}` | {_default(field)} | {meaning}{_choice(field.annotation, meaning)} |")
         if subsection is not None:
             subsections += _section(subsection, path, path.removesuffix("."), "" if mapping else _meaning(model, key))
     if rows:
@@ -172,6 +174,18 @@ def _section(model: type[BaseModel], prefix: str, title: str, about: str = "") -
 def _meaning(model: type[BaseModel], key: str) -> str:
     """What a key means, in one line."""
     return " ".join((model.model_fields[key].description or docstrings(model).get(key, "")).split())
+
+
+def _choice(annotation: Any, meaning: str) -> str:
+    """Sentence with the values that a key may have, if they are listed and its meaning does not name them all."""
+    names = [f"`{value}`" for value in _values(annotation)]
+    return f" One of {', '.join(names)}." if len(names) > 1 and any(name not in meaning for name in names) else ""
+
+
+def _values(annotation: Any) -> list[Any]:
+    """Values in the Literal of an annotation; none without one."""
+    inner = get_args(annotation)
+    return list(inner) if get_origin(annotation) is Literal else [value for each in inner for value in _values(each)]
 
 
 def _default(field: FieldInfo) -> str:

@@ -118,7 +118,7 @@ class Draw(Section):
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1
     """Seed of the draws, points of Sobol's sequence; it is not that of the images."""
     keys: Annotated[dict[str, Distribution], Field(min_length=1, max_length=MAX_KEYS)]
-    """Distribution of each dotted key; those given take precedence over those of `preset`."""
+    """Distribution of each dotted key. Not needed with a `preset`; keys given here take precedence over its."""
 
     @model_validator(mode="before")
     @classmethod

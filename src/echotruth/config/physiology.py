@@ -40,8 +40,8 @@ class Physiology(Section):
     tension_es_min_kPa: FiniteFloat | None = 20.0
     """Smallest active tension at end-systole; the default mouse has 60, and its largest is 112."""
     tension_es_max_kPa: FiniteFloat | None = 180.0
-    """Largest active tension at end-systole; the default human has 108, as the mouse has with five frames a
-    beat."""
+    """Largest active tension at end-systole. The default human has 108 kPa; so has a mouse with only five
+    frames a beat."""
     ejection_fraction_min: Fraction | None = 0.4
     """Smallest ejection fraction; healthy mice and rats have 0.42 to 0.89 (Pacher 2008, doi 10.1038/nprot.2008.138,
     table 1). `human` 0.45: 0.58 +- 0.05 and 0.61 +- 0.05 in men and women (Petersen 2017, doi
