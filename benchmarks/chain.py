@@ -243,6 +243,7 @@ def main() -> None:
     told += f"matrices of 2048 x 2048 in single precision {speed['product']:.2f} s, on one thread."
     remark = f"Wall seconds are added up over the jobs of a case. **: beyond {BEYOND}."
     text = ["# The chain, stage by stage", "", told, "", remark, "", *sections]
+    arguments.results.mkdir(parents=True, exist_ok=True)
     (arguments.results / "chain.md").write_text("\n".join(text))
     print("\n".join(text))
 

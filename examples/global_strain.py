@@ -4,10 +4,12 @@ python examples/global_strain.py            # of the hearts that come with the p
 python examples/global_strain.py out/demo
 """
 
-import sys
+import argparse
 
 import echotruth as et
 
-hearts = et.learning.cases(sys.argv[1] if len(sys.argv) > 1 else "sample")
+parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+parser.add_argument("repository", nargs="?", default="sample", help="its folder")
+hearts = et.learning.cases(parser.parse_args().repository)
 table = hearts[["longitudinal_strain", "ejection_fraction"]]
 print((100 * table).round(1).to_string())
