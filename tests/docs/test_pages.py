@@ -84,8 +84,7 @@ def test_configurations_on_a_page_are_valid(name):
         keys = yaml.safe_load(block)
         if "file" in keys.get("loop", {}):
             keys["loop"]["file"] = "mouse"
-        if "file" not in keys.get("geometry", {}):
-            et.configure(keys)
+        et.configure(keys)
 
 
 def test_hearts_can_be_drawn_as_the_page_on_realistic_images_says():
