@@ -1,7 +1,7 @@
 """How well the muscle of hearts is inferred: error, coverage and calibration on the hearts of config/inference.yaml.
 
     echotruth run config/inference.yaml
-    python benchmarks/tracker_errors.py out/inference
+    python -m benchmarks.tracker_errors out/inference
     python benchmarks/inference.py out/inference --processes 2
     python benchmarks/inference.py out/hearts --processes 2 --motion tracked --size 512
 

@@ -1,12 +1,13 @@
 """Constants that make the quality of trackers the probability that it states.
 
-    python benchmarks/quality.py
+    python -m benchmarks.quality
+    python -m benchmarks.quality volumes    # of bspline_dic in volumes, on hearts of benchmarks/volumes.py
 
 The hearts are those of the half develop of the suite (benchmarks/suite/hearts.py), whose half test says how well the
 quality holds. Their clips are tracked as they are and, by trackers that find hidden tissue, with noise in place of the
 image in a sector of ten degrees, whose points count. The fit is by maximum likelihood of whether points are within
 1/256 of the side of the image of their true places; every clip counts alike. The result is `ERRORS` in
-src/echotruth/tracking/quality.py. It takes three quarters of an hour on two cores.
+src/echotruth/tracking/quality.py. It takes three quarters of an hour on two cores, and of volumes ten minutes.
 """
 
 import argparse
@@ -15,16 +16,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
-from noise_sector import CENTRE_DEG, shadowed
 from scipy import ndimage
 from scipy.optimize import minimize
-from suite import hearts
-from suite.scores import heart_views, view_clips
 from threadpoolctl import threadpool_limits
 
+import echotruth as et
+from benchmarks.noise_sector import CENTRE_DEG, shadowed
 from benchmarks.parallel import in_processes
-from echotruth.config.tracking import OUTSIDE
+from benchmarks.suite import hearts
+from benchmarks.suite.scores import heart_views, view_clips
+from benchmarks.volumes import FITTED, RADIUS, beating
+from echotruth.config.tracking import OUTSIDE, BsplineDic
 from echotruth.evaluation.clip import Clip
+from echotruth.evaluation.volume import VolumeClip, VolumePoints
+from echotruth.repository.datasets import VOLUME, case_of, imaged_heart
 from echotruth.tracking import quality
 from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker import tracked_path
@@ -46,13 +51,18 @@ SURE = 1e-6
 class Sample:
     """What a tracker says of the points of a clip, and whether they are near their true places.
 
-    `clip` is the species, the view, the size and whether there is noise.
+    `clip` is the species, the view, the size and whether there is noise; of volumes species and diagnosis come first.
     """
 
     tracker: str
     clip: tuple[str, str, int, bool]
     terms: quality.Squares
     near: np.ndarray
+    dimensions: int = 2
+
+    def stated(self, model: quality.ErrorModel) -> np.ndarray:
+        """Probability that each point is near."""
+        return quality.within(1.0, model.variance(self.terms), self.dimensions)
 
 
 def samples(row: Mapping[str, object]) -> list[Sample]:
@@ -84,12 +94,34 @@ def _samples_of(clip: Clip, true: np.ndarray, settings, centre_deg: float) -> It
 
 def _values(clip: Clip, true: np.ndarray, settings, counts: np.ndarray) -> tuple[quality.Squares, np.ndarray]:
     """Terms of some of the points that count (frame, n), and whether they are near."""
-    given, step = TrackerInput(*clip.tracker_arguments), slice(None, None, clip.frame_step)
+    step = slice(None, None, clip.frame_step)
+    return _tracked_values(TrackerInput(*clip.tracker_arguments), true[step], settings, counts[step])
+
+
+def volume_samples(row: tuple[str, int, dict]) -> list[Sample]:
+    """Samples of the volumes of a heart: its diagnosis, seed, and keys."""
+    diagnosis, seed, keys = row
+    with threadpool_limits(1):
+        heart = beating(seed, keys)
+        clip = et.image(heart, "whole")
+        images, mask = (clip[name].transpose(..., *VOLUME).values for name in ("image", "mask"))
+        volumes = VolumeClip(case_of(clip), "whole", images, mask)
+        given = TrackerInput(*volumes.tracker_arguments)
+        wall = VolumePoints(*imaged_heart(clip, heart), volumes.positions, RADIUS)
+        true = wall.displacement[..., [0, 2, 1]] / np.min(given.spacing)
+        values = _tracked_values(given, true, BsplineDic(), np.ones(true.shape[:2], bool))
+    return [Sample("bspline_dic_volume", (f"mouse, {diagnosis}", "whole", volumes.size, False), *values, dimensions=3)]
+
+
+def _tracked_values(
+    given: TrackerInput, true: np.ndarray, settings, counts: np.ndarray
+) -> tuple[quality.Squares, np.ndarray]:
+    """As :func:`_values`, of a true displacement in the finest spacing (frame, n, 2 or 3)."""
     path = tracked_path(given, settings)
-    error = np.hypot(*np.moveaxis(path.displacement - true[step], -1, 0)) / (quality.IMAGE_FRACTION * clip.size)
-    chosen = np.isfinite(error) & counts[step]
+    error = np.linalg.norm(path.displacement - true, axis=-1) / (quality.IMAGE_FRACTION * given.side)
+    chosen = np.isfinite(error) & counts
     chosen[0] = False
-    terms = quality.squares(path, speckle_length(given.frames[0], clip.mask), given.shape)
+    terms = quality.squares(path, speckle_length(given.frames[0], given.mask, given.ratio), (given.side,))
     some = (np.broadcast_to(getattr(terms, each.name), error.shape)[chosen][::EVERY] for each in fields(terms))
     return quality.Squares(*some), error[chosen][::EVERY] < 1
 
@@ -110,7 +142,7 @@ def likeliest(given: list[Sample], start: quality.ErrorModel, names: tuple[str, 
 
     def loss(logarithms: np.ndarray) -> float:
         model = replace(start, **dict(zip(names, np.exp(logarithms), strict=True)))
-        stated = np.clip(quality.within(1.0, model.variance(terms)), SURE, 1 - SURE)
+        stated = np.clip(replace(given[0], terms=terms).stated(model), SURE, 1 - SURE)
         return float(-np.average(np.where(near, np.log(stated), np.log1p(-stated)), weights=weight))
 
     begin, bounds = [np.log(getattr(start, name)) for name in names], [(np.log(LOWEST), np.log(HIGHEST))] * len(names)
@@ -129,15 +161,18 @@ def report(found: list[Sample]) -> None:
         print(f'    "{name}": ErrorModel({", ".join(map(str, astuple(model)))}),')
         for clip in sorted({one.clip for one in of_tracker}):
             some = [one for one in of_tracker if one.clip == clip]
-            stated = np.mean([quality.within(1.0, model.variance(one.terms)).mean() for one in some])
+            stated = np.mean([one.stated(model).mean() for one in some])
             right = np.mean([one.near.mean() for one in some])
             print(f"    # {clip}: {100 * stated:.0f} % stated, {100 * right:.0f} % right, {len(some)} clips")
 
 
 def main() -> None:
-    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
-    chosen, found = hearts.plan(hearts.BLOCKS[:1]), []
-    for number, of_heart in enumerate(in_processes(samples, chosen, os.cpu_count() or 1), 1):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("volumes", nargs="?", choices=("volumes",), help="of volumes in place of clips")
+    of_volumes = parser.parse_args().volumes is not None
+    chosen, found = FITTED if of_volumes else hearts.plan(hearts.BLOCKS[:1]), []
+    work = volume_samples if of_volumes else samples
+    for number, of_heart in enumerate(in_processes(work, chosen, os.cpu_count() or 1), 1):
         found += of_heart
         print(f"{number} of {len(chosen)} hearts", flush=True)
     report(found)

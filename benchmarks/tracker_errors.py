@@ -1,8 +1,8 @@
 """Table of the errors of trackers at end-systole, by which parameters of hearts are inferred.
 
-    python benchmarks/tracker_errors.py                                # the table of the package: the suite's hearts
-    python benchmarks/tracker_errors.py out/inference                  # and those of config/inference.yaml
-    python benchmarks/tracker_errors.py out/mine --all -o errors.csv   # one of hearts and trackers of your own
+    python -m benchmarks.tracker_errors                                # the table of the package: the suite's hearts
+    python -m benchmarks.tracker_errors out/inference                  # and those of config/inference.yaml
+    python -m benchmarks.tracker_errors out/mine --all -o errors.csv   # one of hearts and trackers of your own
 
 Only hearts whose label `split` is `develop` count, as the half develop of the suite; with --all those of every
 finished case. Rows of other hearts stay in a table that is there.
@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from suite import columns, detection, parts
 
 import echotruth as et
+from benchmarks.suite import columns, detection, parts
 from echotruth.aha import APEX_SEGMENT
 from echotruth.arrays import Floats
 from echotruth.cases import Case

@@ -1,6 +1,6 @@
 """The same heart and speckle, sliced and whole: what motion through the plane costs, and where 2-D strain errs.
 
-    python -m benchmarks.volumes 0 1 2 3 4 5      # six hearts, some ten minutes of CPU time each
+    python -m benchmarks.volumes 0 1 2 3 4 5 6 7      # hearts, four to seven minutes of CPU time each
     python -m benchmarks.volumes table
 
 A heart is imaged in three dimensions and tracked there, and two slices of the same volumes are tracked as a clip is:
@@ -28,7 +28,8 @@ from echotruth.evaluation.volume import VolumePoints
 from echotruth.heart import Heart
 from echotruth.mechanics.fibres import unit
 from echotruth.notebook.volume import tracked_positions
-from echotruth.repository.datasets import imaged_heart
+from echotruth.repository.datasets import VOLUME, imaged_heart
+from echotruth.tracking.quality import IMAGE_FRACTION
 from echotruth.tracking.tracker import track
 
 TABLE = Path(__file__).parent / "results/volumes.csv"
@@ -36,6 +37,11 @@ RADIUS = 0.45e-3
 """Of the strain operator, m."""
 INFARCT = {"pathology.infarct.segments": [7, 8, 13, 14], "pathology.infarct.age": "fresh"}
 BLOCK = {"pathology.activation.preset": "lbbb"}
+REALISTIC = {
+    **{"realism.preset": "mouse", "realism.ring_down.level_dB": None},
+    **{"bmode.dropout.loss_dB": 0, "bmode.dropout.edge_loss_dB": 0},
+}
+"""Keys of hearts with blood, surroundings, noise and haze."""
 HEARTS: list[tuple[str, int, dict[str, Any]]] = [
     ("healthy", 11, {}),
     ("healthy", 12, {"geometry.scale": 0.95, "loop.circulation.contractility": 0.85}),
@@ -43,8 +49,17 @@ HEARTS: list[tuple[str, int, dict[str, Any]]] = [
     ("infarct", 14, INFARCT | {"pathology.infarct.segments": [9, 10, 15]}),
     ("block", 15, BLOCK),
     ("block", 16, BLOCK | {"loop.circulation.contractility": 1.1}),
+    ("healthy, realistic", 11, REALISTIC),
+    ("turned", 31, {"motion.kind": "rigid", "motion.rigid.rotation_deg": 15}),
 ]
-"""Diagnosis, seed, and keys."""
+"""Diagnosis, seed, and keys; the last only turns."""
+FITTED: list[tuple[str, int, dict[str, Any]]] = [
+    ("healthy", 21, {"loop.circulation.contractility": 0.9}),
+    ("block", 23, BLOCK),
+    ("healthy, realistic", 24, REALISTIC),
+    ("infarct, realistic", 25, INFARCT | REALISTIC),
+]
+"""Hearts on which the quality of volumes is fitted (benchmarks/quality.py)."""
 SETTINGS: dict[str, Any] = {
     "geometry": {"circumferential_elements": 18, "longitudinal_elements": 9, "transmural_elements": 2},
     "loop": {"kind": "circulation", "frames": 16},
@@ -55,21 +70,35 @@ SLICES = {"short_axis": ("elevation", "lateral", 0, "CC"), "long_axis": ("latera
 """Slice -> the dimension that it is across, that beside the axial one, its number in a vector, and its strain."""
 
 
+def beating(seed: int, keys: dict[str, Any]) -> Heart:
+    """A heart of a seed and keys."""
+    return et.beat(et.configure(et.configure(**SETTINGS), seed=seed, **keys))
+
+
 def made(number: int) -> pd.DataFrame:
     """Rows of one heart."""
     diagnosis, seed, keys = HEARTS[number]
-    heart = et.beat(et.configure(et.configure(**SETTINGS), seed=seed, **keys))
+    heart = beating(seed, keys)
     started = time.process_time()
     clip = et.image(heart, "whole")
     imaged = time.process_time()
     tracked = et.track(clip, "bspline_dic")
     row = et.evaluate(tracked, heart).to_dict()
-    row |= {"image_cpu_s": imaged - started, "track_cpu_s": time.process_time() - imaged}
+    row |= {"image_cpu_s": imaged - started, "track_cpu_s": time.process_time() - imaged} | stated(clip, tracked, heart)
     rows = [{"heart": number, "diagnosis": diagnosis, "seed": seed, "tracked": "volume", **row}]
-    for name in SLICES:
+    for name in SLICES if "motion.kind" not in keys else ():
         rows.append({"heart": number, "diagnosis": diagnosis, "seed": seed, "tracked": name})
         rows[-1] |= sliced(name, clip, tracked, heart)
     return pd.DataFrame(rows)
+
+
+def stated(clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> dict[str, float]:
+    """Quality that is stated, and points that are right: the means of all frames but the first."""
+    wall = VolumePoints(*imaged_heart(clip, heart), tracked_positions(tracked), RADIUS)
+    error = np.linalg.norm(tracked["displacement"].values - wall.displacement, axis=-1)[1:]
+    side = max(np.ptp(clip[name].values) * clip.sizes[name] / (clip.sizes[name] - 1) for name in VOLUME)
+    quality = tracked["quality"].values[1:]
+    return {"stated_percent": 100 * quality.mean(), "right_percent": 100 * (error < IMAGE_FRACTION * side).mean()}
 
 
 def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> dict[str, float]:
@@ -112,7 +141,7 @@ def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> di
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("hearts", nargs="+", help="numbers of hearts, 0 to 5; or table")
+    parser.add_argument("hearts", nargs="+", help=f"numbers of hearts, 0 to {len(HEARTS) - 1}; or table")
     numbers = parser.parse_args().hearts
     if numbers == ["table"]:
         print(pd.read_csv(TABLE).T.to_string(float_format="{:.2f}".format))

@@ -124,15 +124,16 @@ ERRORS = {
     "dis": ErrorModel(0.162, 1.72, 0.185, 0.333, 0.104, 0.0, 0.0),
     "dis_fine": ErrorModel(0.139, 1.94, 0.184, 0.336, 0.07, 0.0, 0.0),
     "bspline_dic": ErrorModel(0.153, 0.464, 0.205, 0.297, 0.0326, 0.203, 0.0),
+    "bspline_dic_volume": ErrorModel(0.146, 0.343, 0.268, 0.34, 0.00529, 0.0, 0.0),
     "bspline_cnn": ErrorModel(0.0899, 0.261, 0.116, 0.188, 0.0114, 0.117, 0.693),
 }
-"""Fitted distributions by method, of comparison with ED by METHOD_ED and of the preset `fine` of dis by `dis_fine`.
-That of `bspline_dic` is not fitted on volumes, where it is used too."""
+"""Fitted distributions by method: of comparison with ED by METHOD_ED, of the preset `fine` of dis by `dis_fine`, and of
+volumes by METHOD_volume."""
 
 
-def error_model(settings: Any) -> ErrorModel:
+def error_model(settings: Any, is_volume: bool = False) -> ErrorModel:
     """Distribution of the error of a tracker with the settings of its section in `config/tracking.py`."""
-    return ERRORS[error_name(settings)]
+    return ERRORS[f"{settings.method}_volume" if is_volume else error_name(settings)]
 
 
 def error_name(settings: Any) -> str:

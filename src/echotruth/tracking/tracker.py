@@ -92,7 +92,7 @@ def _track(clip: TrackerInput, settings: Any) -> tuple[np.ndarray, np.ndarray]:
         with threadpool_limits(1):
             path = tracked_path(clip, settings)
             speckle = speckle_length(clip.frames[0], clip.mask, clip.ratio)
-    quality = error_model(settings).probability(path, speckle, (clip.side,))
+    quality = error_model(settings, clip.is_volume).probability(path, speckle, (clip.side,))
     return path.displacement / clip.ratio, quality
 
 
