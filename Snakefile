@@ -23,8 +23,9 @@ The way of a view, of which docs/workflow.md has the picture:
 import sys
 from pathlib import Path
 
-if (Path(workflow.current_basedir) / "src").is_dir():  # a checkout runs itself, whatever is installed
-    sys.path.insert(0, f"{workflow.current_basedir}/src")
+ROOT = Path(workflow.current_basedir)  # also if another workflow takes this one as a module
+if (ROOT / "src").is_dir():  # a checkout runs itself, whatever is installed
+    sys.path.insert(0, f"{ROOT}/src")
 
 from echotruth.config.loading import ConfigError, beside
 from echotruth.workflow import lock, processes
@@ -33,7 +34,7 @@ from echotruth.workflow.status import conclusion
 
 if not config:
 
-    configfile: f"{workflow.current_basedir}/config/demo.yaml"
+    configfile: f"{ROOT}/config/demo.yaml"
 
 
 try:
@@ -56,7 +57,7 @@ TOUCHED = PLAN.touched  # files that jobs of this run touch
 GROUPS = expand(HEART, heart=HEARTS) + expand(f"{CLIP}/{{group}}/zarr.json", case=CASES, view=VIEWS, group=OF_CLIP)
 GROUPS += expand(f"{STORE}/inference/{{case}}/zarr.json", case=CASES if PLAN.config.inference.tracker else [])
 
-shell.prefix(processes.prefix(Path(workflow.current_basedir)))  # sets $SCRIPTS and what all processes share
+shell.prefix(processes.prefix(ROOT))  # sets $SCRIPTS and what all processes share
 
 
 wildcard_constraints:

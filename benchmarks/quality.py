@@ -28,8 +28,9 @@ from benchmarks.suite.scores import heart_views, view_clips
 from benchmarks.volumes import FITTED, RADIUS, beating
 from echotruth.config.tracking import OUTSIDE, BsplineDic
 from echotruth.evaluation.clip import Clip
-from echotruth.evaluation.volume import VolumeClip, VolumePoints
-from echotruth.repository.datasets import VOLUME, case_of, imaged_heart
+from echotruth.evaluation.volume import VolumePoints
+from echotruth.notebook.volume import volume_clip
+from echotruth.repository.datasets import imaged_heart
 from echotruth.tracking import quality
 from echotruth.tracking.speckle import speckle_length
 from echotruth.tracking.tracker import tracked_path
@@ -104,13 +105,13 @@ def volume_samples(row: tuple[str, int, dict]) -> list[Sample]:
     with threadpool_limits(1):
         heart = beating(seed, keys)
         clip = et.image(heart, "whole")
-        images, mask = (clip[name].transpose(..., *VOLUME).values for name in ("image", "mask"))
-        volumes = VolumeClip(case_of(clip), "whole", images, mask)
+        volumes, settings = volume_clip(clip), BsplineDic()
         given = TrackerInput(*volumes.tracker_arguments)
         wall = VolumePoints(*imaged_heart(clip, heart), volumes.positions, RADIUS)
         true = wall.displacement[..., [0, 2, 1]] / np.min(given.spacing)
-        values = _tracked_values(given, true, BsplineDic(), np.ones(true.shape[:2], bool))
-    return [Sample("bspline_dic_volume", (f"mouse, {diagnosis}", "whole", volumes.size, False), *values, dimensions=3)]
+        values = _tracked_values(given, true, settings, np.ones(true.shape[:2], bool))
+    name = quality.error_name(settings, is_volume=True)
+    return [Sample(name, (f"mouse, {diagnosis}", "whole", volumes.size, False), *values, dimensions=3)]
 
 
 def _tracked_values(

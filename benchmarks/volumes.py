@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,9 +29,10 @@ from echotruth.evaluation.volume import VolumePoints
 from echotruth.heart import Heart
 from echotruth.mechanics.fibres import unit
 from echotruth.notebook.volume import tracked_positions
-from echotruth.repository.datasets import VOLUME, imaged_heart
+from echotruth.repository.datasets import case_of, imaged_heart
 from echotruth.tracking.quality import IMAGE_FRACTION
 from echotruth.tracking.tracker import track
+from echotruth.units import mm
 
 TABLE = Path(__file__).parent / "results/volumes.csv"
 RADIUS = 0.45e-3
@@ -38,8 +40,10 @@ RADIUS = 0.45e-3
 INFARCT = {"pathology.infarct.segments": [7, 8, 13, 14], "pathology.infarct.age": "fresh"}
 BLOCK = {"pathology.activation.preset": "lbbb"}
 REALISTIC = {
-    **{"realism.preset": "mouse", "realism.ring_down.level_dB": None},
-    **{"bmode.dropout.loss_dB": 0, "bmode.dropout.edge_loss_dB": 0},
+    "realism.preset": "mouse",
+    "realism.ring_down.level_dB": None,
+    "bmode.dropout.loss_dB": 0,
+    "bmode.dropout.edge_loss_dB": 0,
 }
 """Keys of hearts with blood, surroundings, noise and haze."""
 HEARTS: list[tuple[str, int, dict[str, Any]]] = [
@@ -84,25 +88,30 @@ def made(number: int) -> pd.DataFrame:
     imaged = time.process_time()
     tracked = et.track(clip, "bspline_dic")
     row = et.evaluate(tracked, heart).to_dict()
-    row |= {"image_cpu_s": imaged - started, "track_cpu_s": time.process_time() - imaged} | stated(clip, tracked, heart)
+    row |= {"image_cpu_s": imaged - started, "track_cpu_s": time.process_time() - imaged}
+    wall = VolumePoints(*imaged_heart(clip, heart), tracked_positions(tracked), RADIUS)
+    row |= stated(clip, tracked, wall)
     rows = [{"heart": number, "diagnosis": diagnosis, "seed": seed, "tracked": "volume", **row}]
     for name in SLICES if "motion.kind" not in keys else ():
         rows.append({"heart": number, "diagnosis": diagnosis, "seed": seed, "tracked": name})
-        rows[-1] |= sliced(name, clip, tracked, heart)
+        rows[-1] |= sliced(name, clip, tracked, wall)
     return pd.DataFrame(rows)
 
 
-def stated(clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> dict[str, float]:
+def stated(clip: xr.Dataset, tracked: xr.Dataset, wall: VolumePoints) -> dict[str, float]:
     """Quality that is stated, and points that are right: the means of all frames but the first."""
-    wall = VolumePoints(*imaged_heart(clip, heart), tracked_positions(tracked), RADIUS)
     error = np.linalg.norm(tracked["displacement"].values - wall.displacement, axis=-1)[1:]
-    side = max(np.ptp(clip[name].values) * clip.sizes[name] / (clip.sizes[name] - 1) for name in VOLUME)
+    side = max(case_of(clip).config.volume.field_mm) * mm
     quality = tracked["quality"].values[1:]
     return {"stated_percent": 100 * quality.mean(), "right_percent": 100 * (error < IMAGE_FRACTION * side).mean()}
 
 
-def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> dict[str, float]:
-    """Errors in the plane at ES of a slice that is tracked alone, and of the volume, at the points of the slice."""
+def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, every: VolumePoints) -> dict[str, float]:
+    """Errors in the plane at ES of a slice that is tracked alone, and of the volume, at the points of the slice.
+
+    Those of the whole wall are `every`.
+    """
+    heart = every.heart
     across, beside, component, along = SLICES[name]
     planes = np.unique(tracked[across])
     plane = planes[np.abs(planes).argmin()]
@@ -118,14 +127,13 @@ def sliced(name: str, clip: xr.Dataset, tracked: xr.Dataset, heart: Heart) -> di
     points = np.column_stack([own[beside].values - first, own["axial"].values - axial[0]]) / step
     found = step * track(images, points, mask, step, clip["time"].values, 0, BsplineDic())[0][heart.es]
     position = tracked_positions(own)
-    wall, in_plane = VolumePoints(*imaged_heart(clip, heart), position, RADIUS), [component, 1]
+    wall, in_plane = replace(every, position=position), [component, 1]
     true, whole = wall.displacement[heart.es], tracked["displacement"].values[heart.es]
     of_volume = own["displacement"].values[heart.es]
     errors = {"slice": found - true[:, in_plane], "volume": (of_volume - true)[:, in_plane]}
     known = np.isfinite(errors["slice"]).all(axis=1) & np.isfinite(errors["volume"]).all(axis=1)
     size, number = np.linalg.norm(true[known][:, in_plane]), ("RR", "CC", "LL").index(along)
     axes = wall.operator.axes[:, [0, number]][:, :, in_plane]
-    every = VolumePoints(*imaged_heart(clip, heart), tracked_positions(tracked), RADIUS)
     strain = every.operator.strain(whole[None])[0, :, number]
     means = {
         "true": wall.strain(heart.es)[:, number].mean(),

@@ -121,6 +121,11 @@ def test_downsampling_preserves_the_mean():
     assert downsample(np.array([[1, 2], [3, 4]], np.uint8), 2).tolist() == [[2]]
 
 
+def test_blocks_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match="blocks of 3"):
+        downsample(np.zeros((16, 16), np.uint8), 3)
+
+
 def test_clip_holds_every_size():
     random = np.random.default_rng(1)
     shape = (2, len(ANGLE), len(RANGE))

@@ -22,6 +22,11 @@ def test_lines_of_a_linear_scan_are_parallel_and_span_the_array_or_the_width_ask
     assert scan_width(Probe(), Rf(scan="linear", width_mm=2.0)) == pytest.approx(2e-3)
 
 
+def test_lines_beyond_the_array_are_refused():
+    with pytest.raises(ValueError, match=r"Lines over 4 mm need a longer array: this one measures 2\.944 mm"):
+        scan_lines(Probe(), Rf(scan="linear", width_mm=4.0))
+
+
 @pytest.mark.parametrize("kind", ["sector", "linear"])
 def test_scan_coordinates_of_a_sample_are_its_line_and_range(kind):
     scan = scan_lines(Probe(), Rf(lines=16, scan=kind))

@@ -1,10 +1,9 @@
-"""Bootstrap over hearts: intervals of means and medians, and ranks.
+"""Bootstrap over hearts: intervals of means, and ranks.
 
 Clips of one heart resemble each other, so that hearts and not clips are drawn with replacement (Efron, Ann Stat 1979;
 7:1, doi 10.1214/aos/1176344552; Field & Welsh, J R Stat Soc B 2007; 69:369, doi 10.1111/j.1467-9868.2007.00593.x, on
 clusters). Intervals are the middle 95 % of the statistics of the samples, in which all trackers share the hearts. With
-few hearts they are too narrow: of normal values, those of the mean of 6, 12 and 24 hold it in 86, 90 and 93 of 100
-cases, those of the median in 93, 94 and 94.
+few hearts they are too narrow: of normal values, those of 6, 12 and 24 hold the mean in 86, 90 and 93 of 100 cases.
 """
 
 from collections.abc import Sequence

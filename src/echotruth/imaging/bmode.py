@@ -237,15 +237,11 @@ def sharpened(level: np.ndarray, inside: np.ndarray, amount: float, width_px: fl
     -------
     Same shape and type.
     """
-    return np.where(inside, level + amount * _detail(level, inside, width_px), level)
-
-
-def _detail(level: np.ndarray, inside: np.ndarray, width_px: float) -> np.ndarray:
-    """Difference of an image from its Gaussian mean over the pixels of the scan; parameters as of :func:`sharpened`."""
     from scipy.ndimage import gaussian_filter  # takes longer to import than all else here
 
     weight = gaussian_filter(inside.astype(level.dtype), width_px)
-    return level - gaussian_filter(np.where(inside, level, 0), width_px) / np.where(inside, weight, 1)
+    mean = gaussian_filter(np.where(inside, level, 0), width_px) / np.where(inside, weight, 1)
+    return np.where(inside, level + amount * (level - mean), level)
 
 
 def eight_bit(levels: np.ndarray, bmode: Bmode) -> np.ndarray:
@@ -273,6 +269,8 @@ def downsample(images: np.ndarray, divisor: int) -> np.ndarray:
     Shape (..., axial / divisor, lateral / divisor), uint8. Halves are rounded to even, so that there is no bias.
     """
     *rest, rows, columns = images.shape
+    if rows % divisor or columns % divisor:
+        raise ValueError(f"An image of {rows} x {columns} px cannot be divided into blocks of {divisor} px.")
     blocks = images.reshape(*rest, rows // divisor, divisor, columns // divisor, divisor)
     return np.rint(blocks.mean(axis=(-3, -1), dtype=np.float32)).astype(np.uint8)
 

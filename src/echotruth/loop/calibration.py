@@ -263,6 +263,6 @@ def _periodic(kept: float, gained: float, flow: Floats) -> Floats:
 
 
 def _held(values: Floats, known: NDArray[np.bool_], period: int | None = None) -> Floats:
-    """Values between those known; before and after them the first and the last, or what the period says."""
+    """Values between those known. Before and after them the first and the last, unless the curve has a period."""
     frames = np.flatnonzero(known)
     return np.interp(np.arange(len(values)), frames, values[frames], period=period)

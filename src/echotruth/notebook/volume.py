@@ -80,19 +80,24 @@ def track_volume(clip: xr.Dataset, settings: Section) -> xr.Dataset:
         displacement (frame, point, vector: lateral, axial, elevation), m, since end-diastole, and quality
         (frame, point), at points of the wall, whose positions at end-diastole are coordinates, m.
     """
-    case = case_of(clip)
-    images, mask = (clip[name].transpose(..., *VOLUME).values for name in ("image", "mask"))
+    volumes = volume_clip(clip)
+    case, mask = volumes.case, volumes.mask
     if not mask.any():
         raise ValueError("clip: its mask is empty, so that there is no wall to track.")
     if any(np.take(mask, [0, -1], axis).any() for axis in range(3)):
         warnings.warn("the wall reaches a face of the volume: tissue that leaves it is not tracked right", stacklevel=3)
-    volumes = VolumeClip(case, clip.attrs["view"], images, mask)
     found = volumes.arrays(*track(*volumes.tracker_arguments, volumes.suited(settings)))
     arrays = dataset(case, as_stored(case, {"tracking/TRACKER": found}), {"frame": clip["frame"].values})
     positions = zip(schema.LABELS["vector"], volumes.positions.T, strict=True)
     return arrays.assign_coords({name: ("point", at, {"units": "m"}) for name, at in positions}).assign_attrs(
         clip.attrs
     )
+
+
+def volume_clip(clip: xr.Dataset) -> VolumeClip:
+    """Volumes as trackers receive them."""
+    images, mask = (clip[name].transpose(..., *VOLUME).values for name in ("image", "mask"))
+    return VolumeClip(case_of(clip), clip.attrs["view"], images, mask)
 
 
 def evaluate_volume(tracked: xr.Dataset, heart: Heart) -> pd.Series:

@@ -20,8 +20,18 @@ from echotruth.repository.code import code_hash
 from echotruth.section import Section
 
 PACKAGES = (
-    *("echotruth", "numpy", "scipy", "numba", "scikit-image", "pypardiso", "mkl", "meshio"),
-    *("vtk", "xarray", "zarr", "onnxruntime"),
+    "echotruth",
+    "numpy",
+    "scipy",
+    "numba",
+    "scikit-image",
+    "pypardiso",
+    "mkl",
+    "meshio",
+    "vtk",
+    "xarray",
+    "zarr",
+    "onnxruntime",
 )
 """Packages whose version may affect the numbers, besides OpenCV, which is installed under several names."""
 

@@ -133,12 +133,16 @@ volumes by METHOD_volume."""
 
 def error_model(settings: Any, is_volume: bool = False) -> ErrorModel:
     """Distribution of the error of a tracker with the settings of its section in `config/tracking.py`."""
-    return ERRORS[f"{settings.method}_volume" if is_volume else error_name(settings)]
+    return ERRORS[error_name(settings, is_volume)]
 
 
-def error_name(settings: Any) -> str:
+def error_name(settings: Any, is_volume: bool = False) -> str:
     """Key of :data:`ERRORS` for the settings of a tracker."""
-    variants = (getattr(settings, "reference", None), getattr(settings, "preset", None))
+    variants = (
+        getattr(settings, "reference", None),
+        getattr(settings, "preset", None),
+        "volume" if is_volume else None,
+    )
     special = [f"{settings.method}_{variant}" for variant in variants]
     return next((name for name in special if name in ERRORS), settings.method)
 

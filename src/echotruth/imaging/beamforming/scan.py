@@ -70,7 +70,11 @@ def scan_lines(probe: Probe, rf: Rf) -> Scan:
 
 def scan_width(probe: Probe, rf: Rf) -> float:
     """Distance between the outermost lines of a linear scan, m."""
-    return rf.width_mm * mm if rf.width_mm else probe.elements * (probe.pitch_um * um)
+    length = probe.elements * (probe.pitch_um * um)
+    width = rf.width_mm * mm if rf.width_mm else length
+    if width > length * (1 + 1e-9):
+        raise ValueError(f"Lines over {1e3 * width:g} mm need a longer array: this one measures {1e3 * length:g} mm.")
+    return width
 
 
 def sample_positions(scan: Scan, range_: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

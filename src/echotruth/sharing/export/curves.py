@@ -1,6 +1,7 @@
 """Curves as tidy CSV: one row a frame, tracker and quantity, and a table of what is read off them."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 
 from echotruth.arrays import Floats
 from echotruth.fem.volume import cell_volumes
+from echotruth.repository.estimates import NotEvaluated
 from echotruth.sharing.export.clip import ExportedClip
 
 COMPONENTS = ("RR", "CC", "LL")
@@ -48,10 +50,9 @@ def write(clip: ExportedClip, path: Path, trackers: Sequence[str]) -> None:
     """
     parts = [*_heart(clip), *_heart_strain(clip)]
     for tracker in trackers:
-        if not clip.repository.attributes(f"tracking/{tracker}", clip.case.id, clip.view):
-            continue
-        curves = clip.repository.curves(clip.case.id, clip.view, tracker, clip.size)
-        parts += [part.assign(tracker=tracker) for part in _tracked(curves)]
+        with suppress(NotEvaluated):
+            curves = clip.repository.curves(clip.case.id, clip.view, tracker, clip.size)
+            parts += [part.assign(tracker=tracker) for part in _tracked(curves)]
     table = pd.concat(parts, ignore_index=True)
     table = table.assign(case=clip.case.id, view=clip.view, size_px=clip.size)
     table["time_ms"] = 1e3 * clip.time[table["frame"].to_numpy()]
